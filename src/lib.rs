@@ -1,0 +1,12 @@
+//! `pcadlang`: a probabilistic CAD language.
+#![warn(missing_docs)]
+#![forbid(unsafe_code)]
+
+pub mod diag;
+pub mod dist;
+pub mod geom;
+pub mod num;
+pub mod render;
+pub mod rng;
+pub mod syntax;
+pub mod vision;
