@@ -1,0 +1,497 @@
+//! Lowered code: blocks of operations in slots, with every name resolved.
+//!
+//! A block is a straight line of operations; slot `i` holds the result of operation `i`, and an operand is a constant, a
+//! slot of the same block, or a slot of an enclosing one. Bodies that may run any number of times (functions, branches,
+//! loop passes) are blocks of their own. The trace instantiates a block as a frame of nodes, one node a slot, and
+//! evaluates a slot when something asks for it.
+
+use super::builtins::Table;
+use super::key::Key;
+use super::value::Value;
+use crate::syntax::span::Span;
+use std::sync::Arc;
+
+/// The index of a block in [`Code::blocks`].
+pub type BlockId = u32;
+/// The index of a slot in a block.
+pub type Slot = u32;
+
+/// Where an operation finds an input.
+#[derive(Clone, Copy, Debug, PartialEq, Eq, Hash)]
+pub enum Operand {
+    /// A constant, by index into [`Code::consts`].
+    Const(u32),
+    /// A slot of the same block.
+    Local(Slot),
+    /// A slot of the block `up` levels out.
+    Outer {
+        /// How many lexical levels out.
+        up: u16,
+        /// The slot there.
+        slot: Slot,
+    },
+}
+
+/// A whole lowered program.
+#[derive(Debug, Default)]
+pub struct Code {
+    /// The blocks; block 0 is the top level.
+    pub blocks: Vec<Block>,
+    /// The constants.
+    pub consts: Vec<Value>,
+    /// The built-ins that indices in operations refer to.
+    pub builtins: Arc<Table>,
+    /// The sites of choices, observations, calls and loops.
+    pub sites: Vec<Site>,
+    /// Every tag name that occurs.
+    pub tags: Vec<Arc<str>>,
+    /// Top-level names and their slots, in order of binding.
+    pub globals: indexmap::IndexMap<Arc<str>, Operand>,
+    /// What `predict` records, in order.
+    pub predictions: Vec<(Arc<str>, Slot)>,
+    /// The names bound by `assume`, in order: what a report shows when nothing else is collected.
+    pub assumed: Vec<(Arc<str>, Slot)>,
+    /// `sample e;` statements, in order.
+    pub samples: Vec<Slot>,
+}
+
+/// What a block is for.
+#[derive(Clone, Debug, PartialEq)]
+pub enum BlockKind {
+    /// The top level.
+    Root,
+    /// A function.
+    Function {
+        /// Its name; `fn` when it has none.
+        name: Arc<str>,
+        /// The names of its parameters.
+        params: Arc<[Arc<str>]>,
+        /// How many of them, from the left, have no default.
+        required: usize,
+    },
+    /// A branch of an `if`.
+    Branch,
+    /// The body of a `for` statement.
+    Loop,
+}
+
+/// A straight line of operations.
+#[derive(Clone, Debug)]
+pub struct Block {
+    /// What it is for.
+    pub kind: BlockKind,
+    /// The lexically enclosing block.
+    pub parent: Option<BlockId>,
+    /// The operations, by slot.
+    pub ops: Vec<Op>,
+    /// Where each operation was written.
+    pub spans: Vec<Span>,
+    /// The value of the block.
+    pub result: Option<Operand>,
+    /// The slots that run whether or not anything asks for them: observations, factors, and what contains them.
+    pub effects: Vec<Slot>,
+    /// By slot: whether it is among `effects`.
+    pub is_effect: Vec<bool>,
+    /// By slot: the slots of this block that have it as an operand.
+    pub users: Vec<Box<[Slot]>>,
+}
+
+/// A place in the text that adds to addresses.
+#[derive(Clone, Debug)]
+pub struct Site {
+    /// The segments it adds to the path of its function's frame, outermost first. The keys of the enclosing loops go to
+    /// the first of them.
+    pub segments: Arc<[SiteSegment]>,
+    /// Which of the enclosing loops of the same function, innermost first, add no key because the target carries it.
+    pub carried: u32,
+    /// Tags of the choices at and below it: name and value.
+    pub tags: Box<[SiteTag]>,
+}
+
+/// A segment of a [`Site`].
+#[derive(Clone, Debug, PartialEq, Eq, Hash)]
+pub struct SiteSegment {
+    /// Its name.
+    pub name: Arc<str>,
+    /// Which occurrence.
+    pub occurrence: u32,
+    /// A hash of both.
+    pub hash: u64,
+}
+
+impl SiteSegment {
+    /// A segment; observations without a name show their occurrence even when it is the first.
+    pub fn new(name: Arc<str>, occurrence: u32) -> Self {
+        let hash = segment_hash(&name, occurrence);
+        SiteSegment { name, occurrence, hash }
+    }
+}
+
+/// The hash of a segment without its keys.
+pub fn segment_hash(name: &str, occurrence: u32) -> u64 {
+    super::key::mix(super::key::hash_str(0x5e67_3a11, name), u64::from(occurrence))
+}
+
+/// A tag at a site.
+#[derive(Clone, Debug)]
+pub struct SiteTag {
+    /// The index of its name in [`Code::tags`].
+    pub name: u32,
+    /// Its value, if it has one; an operand of the site's block.
+    pub value: Option<Operand>,
+}
+
+/// A distribution: made in place from its parameters, or a value.
+#[derive(Clone, Debug)]
+pub enum DistSpec {
+    /// A call of a built-in family, made where it is needed and never stored.
+    Family {
+        /// The built-in, by index in the table.
+        builtin: u32,
+        /// Its parameters in the table's order.
+        args: Box<[Operand]>,
+    },
+    /// Any expression whose value is a distribution or likelihood.
+    Value(Operand),
+}
+
+impl DistSpec {
+    /// The operands it reads.
+    pub fn operands(&self) -> &[Operand] {
+        match self {
+            DistSpec::Family { args, .. } => args,
+            DistSpec::Value(v) => std::slice::from_ref(v),
+        }
+    }
+}
+
+/// The function of a call.
+#[derive(Clone, Copy, Debug)]
+pub enum Callee {
+    /// A named top-level function.
+    Static(BlockId),
+    /// A value.
+    Value(Operand),
+}
+
+/// Where the elements of a keyed container are drawn.
+#[derive(Clone, Debug)]
+pub struct Source {
+    /// The `for` operations to go through, outermost first: a slot of the container's block, then of each body.
+    pub loops: Box<[Slot]>,
+    /// The draw, in the innermost body (or the container's own block).
+    pub draw: Slot,
+    /// Its keys.
+    pub keys: Box<[SourceKey]>,
+}
+
+/// A key of a drawn element.
+#[derive(Clone, Copy, Debug)]
+pub enum SourceKey {
+    /// The variable of the enclosing loop, by index into [`Source::loops`].
+    Loop(u32),
+    /// An operand of the draw's block.
+    Operand(Operand),
+}
+
+/// What is asked of the trace as a whole.
+#[derive(Clone, Copy, Debug, PartialEq, Eq)]
+pub enum Probe {
+    /// The log joint density.
+    LogJoint,
+    /// Its prior part.
+    LogPrior,
+    /// Its observed part.
+    LogLikelihood,
+}
+
+/// An operation.
+#[derive(Clone, Debug)]
+pub enum Op {
+    /// A parameter of the function, or its default.
+    Param {
+        /// Which parameter.
+        index: u16,
+        /// Its default.
+        default: Option<Operand>,
+    },
+    /// The element a loop pass or `map` call is for.
+    Item,
+    /// The running value of a `fold`.
+    Accumulator,
+    /// A built-in function.
+    Prim {
+        /// Its index in the table.
+        builtin: u32,
+        /// Its arguments in the table's order; the constant `nothing` for those left out.
+        args: Box<[Operand]>,
+    },
+    /// `[a, b]`
+    Array(Box<[Operand]>),
+    /// `{ a: x, b: y }`
+    Record {
+        /// The names.
+        names: Box<[Arc<str>]>,
+        /// The values.
+        values: Box<[Operand]>,
+    },
+    /// `a[i]`, `a.b`, and `t[i][j]` of a container with two keys.
+    Index {
+        /// The array, record, object or container.
+        base: Operand,
+        /// The keys.
+        keys: Box<[Operand]>,
+    },
+    /// A call of a user function.
+    Call {
+        /// The function.
+        callee: Callee,
+        /// The arguments as written.
+        args: Box<[(Option<Arc<str>>, Operand)]>,
+        /// What it adds to addresses.
+        site: u32,
+    },
+    /// `if c { … } else { … }`
+    If {
+        /// The condition.
+        cond: Operand,
+        /// When true.
+        then: BlockId,
+        /// When false.
+        otherwise: BlockId,
+    },
+    /// A function value, closing over this frame.
+    Closure(BlockId),
+    /// `for x in e { … }`: holds one frame a pass.
+    For {
+        /// What it runs over.
+        iter: Operand,
+        /// The body.
+        body: BlockId,
+    },
+    /// `map(f, xs)`: a container of results.
+    Map {
+        /// The function.
+        f: Operand,
+        /// What it runs over.
+        over: Operand,
+        /// What it adds to addresses; the element's key goes to its last binding segment.
+        site: u32,
+    },
+    /// `fold(f, init, xs)`
+    Fold {
+        /// The function of running value and element.
+        f: Operand,
+        /// The first running value.
+        init: Operand,
+        /// What it runs over.
+        over: Operand,
+        /// What it adds to addresses.
+        site: u32,
+    },
+    /// A keyed container of random choices.
+    Container {
+        /// Its name.
+        name: Arc<str>,
+        /// Where its elements are drawn.
+        sources: Box<[Source]>,
+    },
+    /// The array or record of all elements of the container in the slot before.
+    Gather,
+    /// `mem(f)`
+    Mem {
+        /// The function.
+        f: Operand,
+        /// What it adds to addresses.
+        site: u32,
+    },
+    /// A random choice.
+    Draw {
+        /// Its distribution.
+        dist: DistSpec,
+        /// Its address.
+        site: u32,
+        /// The keys of `t[k] ~ d`.
+        keys: Box<[Operand]>,
+    },
+    /// An observation.
+    Observe {
+        /// The distribution or likelihood.
+        dist: DistSpec,
+        /// The observed value.
+        value: Operand,
+        /// The surrogate of delayed acceptance: a slot of this block that nothing else asks for.
+        coarse: Option<Operand>,
+        /// Its address.
+        site: u32,
+    },
+    /// A soft constraint.
+    Factor {
+        /// The log weight.
+        weight: Operand,
+        /// Its address.
+        site: u32,
+    },
+    /// A property of the whole trace; never cached.
+    Probe(Probe),
+}
+
+impl Op {
+    /// Calls `f` with each operand the operation always reads when it is evaluated; branches, bodies and callees read more.
+    pub fn operands(&self, mut f: impl FnMut(Operand)) {
+        match self {
+            Op::Param { default, .. } => default.iter().copied().for_each(f),
+            Op::Prim { args, .. } => args.iter().copied().for_each(f),
+            Op::Array(xs) => xs.iter().copied().for_each(f),
+            Op::Record { values, .. } => values.iter().copied().for_each(f),
+            Op::Index { base, keys } => {
+                f(*base);
+                keys.iter().copied().for_each(f);
+            }
+            Op::Call { callee, args, .. } => {
+                if let Callee::Value(v) = callee {
+                    f(*v);
+                }
+                args.iter().for_each(|(_, a)| f(*a));
+            }
+            Op::If { cond, .. } => f(*cond),
+            Op::For { iter, .. } => f(*iter),
+            Op::Map { f: g, over, .. } => {
+                f(*g);
+                f(*over);
+            }
+            Op::Fold { f: g, init, over, .. } => {
+                f(*g);
+                f(*init);
+                f(*over);
+            }
+            Op::Mem { f: g, .. } => f(*g),
+            Op::Draw { dist, keys, .. } => {
+                dist.operands().iter().copied().for_each(&mut f);
+                keys.iter().copied().for_each(f);
+            }
+            Op::Observe { dist, value, .. } => {
+                dist.operands().iter().copied().for_each(&mut f);
+                f(*value);
+            }
+            Op::Factor { weight, .. } => f(*weight),
+            Op::Container { .. } | Op::Gather | Op::Item | Op::Accumulator | Op::Closure(_) | Op::Probe(_) => {}
+        }
+    }
+}
+
+impl Block {
+    /// An empty block.
+    pub fn new(kind: BlockKind, parent: Option<BlockId>) -> Self {
+        Block {
+            kind,
+            parent,
+            ops: Vec::new(),
+            spans: Vec::new(),
+            result: None,
+            effects: Vec::new(),
+            is_effect: Vec::new(),
+            users: Vec::new(),
+        }
+    }
+
+    /// Adds an operation and gives its slot.
+    pub fn push(&mut self, op: Op, span: Span) -> Slot {
+        self.ops.push(op);
+        self.spans.push(span);
+        self.ops.len() as Slot - 1
+    }
+}
+
+impl Code {
+    /// The index of a constant, added if new. Numbers, bools and strings are shared.
+    pub fn constant(&mut self, v: Value) -> Operand {
+        let shareable = matches!(v, Value::Num(_) | Value::Bool(_) | Value::Str(_) | Value::Unit | Value::Builtin(_));
+        if shareable && let Some(i) = self.consts.iter().position(|c| c.same(&v)) {
+            return Operand::Const(i as u32);
+        }
+        self.consts.push(v);
+        Operand::Const(self.consts.len() as u32 - 1)
+    }
+
+    /// Fills in what follows from the operations: in-block users and effects.
+    pub fn finish(&mut self) {
+        for block in &mut self.blocks {
+            let mut users = vec![Vec::new(); block.ops.len()];
+            for (slot, op) in block.ops.iter().enumerate() {
+                op.operands(|o| {
+                    if let Operand::Local(s) = o
+                        && users[s as usize].last() != Some(&(slot as Slot))
+                    {
+                        users[s as usize].push(slot as Slot);
+                    }
+                });
+                if matches!(op, Op::Gather) {
+                    users[slot - 1].push(slot as Slot);
+                }
+            }
+            block.users = users.into_iter().map(Vec::into_boxed_slice).collect();
+        }
+        self.find_effects();
+    }
+
+    /// Marks the slots that observe, or hold or call a block that does. Calls of function values count if any function
+    /// that is used as a value observes.
+    fn find_effects(&mut self) {
+        let n = self.blocks.len();
+        let mut observes = vec![false; n];
+        let mut escaped_observes = false;
+        loop {
+            let mut changed = false;
+            for b in 0..n {
+                let has = self.blocks[b].ops.iter().any(|op| op_observes(op, &observes, escaped_observes));
+                if has && !observes[b] {
+                    observes[b] = true;
+                    changed = true;
+                }
+            }
+            let escaped = self.blocks.iter().flat_map(|b| &b.ops).any(|op| match op {
+                Op::Closure(block) => observes[*block as usize],
+                _ => false,
+            }) || self.consts.iter().any(|c| match c {
+                Value::Closure(c) => observes[c.block as usize],
+                _ => false,
+            });
+            if escaped && !escaped_observes {
+                escaped_observes = true;
+                changed = true;
+            }
+            if !changed {
+                break;
+            }
+        }
+        for block in &mut self.blocks {
+            block.is_effect = block.ops.iter().map(|op| op_observes(op, &observes, escaped_observes)).collect();
+            block.effects = (0..block.ops.len() as Slot).filter(|s| block.is_effect[*s as usize]).collect();
+        }
+    }
+
+    /// The value of a constant.
+    pub fn const_value(&self, i: u32) -> &Value {
+        &self.consts[i as usize]
+    }
+
+    /// Every literal key of a container indexed somewhere would go here; computed keys are checked when they run.
+    pub fn key_of(&self, o: Operand) -> Option<Key> {
+        match o {
+            Operand::Const(i) => Key::from_value(self.const_value(i)),
+            _ => None,
+        }
+    }
+}
+
+fn op_observes(op: &Op, observes: &[bool], escaped: bool) -> bool {
+    match op {
+        Op::Observe { .. } | Op::Factor { .. } => true,
+        Op::If { then, otherwise, .. } => observes[*then as usize] || observes[*otherwise as usize],
+        Op::For { body, .. } => observes[*body as usize],
+        Op::Call { callee: Callee::Static(b), .. } => observes[*b as usize],
+        Op::Call { callee: Callee::Value(_), .. } | Op::Map { .. } | Op::Fold { .. } => escaped,
+        _ => false,
+    }
+}

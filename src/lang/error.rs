@@ -1,0 +1,96 @@
+//! Errors while a program runs: what went wrong, where in the text, at which address, through which calls.
+
+use crate::syntax::span::Span;
+use super::address::Address;
+use std::fmt;
+use std::sync::Arc;
+
+/// What kind of failure it is, and so what may be done about it.
+#[derive(Clone, Copy, Debug, PartialEq, Eq)]
+pub enum FaultKind {
+    /// A number outside a parameter's domain, a matrix that will not factor: impossible under the model, so that a proposal
+    /// that leads here is rejected and counted. At the start of a chain it is reported.
+    Domain,
+    /// A value of the wrong type.
+    Type,
+    /// An index or key that is not there.
+    Index,
+    /// A limit on recursion or size.
+    Limit,
+    /// A value that needs itself.
+    Cycle,
+    /// Two draws at one address.
+    Duplicate,
+    /// A file that cannot be read, and anything else.
+    Other,
+}
+
+/// A failure inside a built-in function: it knows its arguments, not where it was called.
+#[derive(Clone, Debug, PartialEq)]
+pub struct Fault {
+    /// What kind.
+    pub kind: FaultKind,
+    /// What went wrong.
+    pub message: String,
+    /// What to try.
+    pub hint: Option<String>,
+}
+
+impl Fault {
+    /// A failure of some kind.
+    pub fn new(kind: FaultKind, message: impl Into<String>) -> Self {
+        Fault { kind, message: message.into(), hint: None }
+    }
+
+    /// A number outside its domain.
+    pub fn domain(message: impl Into<String>) -> Self {
+        Fault::new(FaultKind::Domain, message)
+    }
+
+    /// A value of the wrong type.
+    pub fn type_error(message: impl Into<String>) -> Self {
+        Fault::new(FaultKind::Type, message)
+    }
+
+    /// The same with a hint.
+    pub fn with_hint(mut self, hint: impl Into<String>) -> Self {
+        self.hint = Some(hint.into());
+        self
+    }
+}
+
+/// A failure while a program runs.
+#[derive(Clone, Debug, PartialEq)]
+pub struct RunError {
+    /// What kind.
+    pub kind: FaultKind,
+    /// What went wrong.
+    pub message: String,
+    /// The expression or statement being executed.
+    pub span: Span,
+    /// The address being executed.
+    pub address: Address,
+    /// The calls that lead there, outermost first: function and call site.
+    pub calls: Vec<(Arc<str>, Span)>,
+    /// What to try.
+    pub hint: Option<String>,
+}
+
+impl RunError {
+    /// Whether a proposal that fails like this is to be rejected rather than to end the run.
+    pub fn is_recoverable(&self) -> bool {
+        self.kind == FaultKind::Domain
+    }
+}
+
+impl fmt::Display for RunError {
+    fn fmt(&self, f: &mut fmt::Formatter<'_>) -> fmt::Result {
+        write!(f, "{}", self.message)?;
+        if !self.address.segments.is_empty() {
+            write!(f, " (at {})", self.address)?;
+        }
+        Ok(())
+    }
+}
+
+impl std::error::Error for RunError {}

@@ -1,0 +1,58 @@
+//! Indexing plain values: arrays by position, records by name, objects by field.
+
+use super::error::{Fault, FaultKind};
+use super::value::Value;
+use std::sync::Arc;
+
+/// `base[key]` and `base.key`. An array of positions picks that many elements.
+///
+/// # Errors
+/// A position or name that is not there, or a value that has none.
+pub fn index_value(base: &Value, key: &Value) -> Result<Value, Fault> {
+    match (base, key) {
+        (Value::Array(_) | Value::List(_), Value::Num(x)) => position(base, *x),
+        (Value::Array(_) | Value::List(_), Value::Array(at)) => {
+            let picked: Result<Vec<Value>, Fault> = at.iter().map(|x| position(base, *x)).collect();
+            picked.map(Value::from_elements)
+        }
+        (Value::Record(r), Value::Str(name)) => r.get(name).cloned().ok_or_else(|| {
+            let fault = Fault::new(FaultKind::Index, format!("the record has no field `{name}`"));
+            let fields = r.keys().map(|k| &**k);
+            match crate::diag::nearest(name, fields.clone()) {
+                Some(near) => fault.with_hint(format!("did you mean `{near}`?")),
+                None => fault.with_hint(format!("its fields are {}", fields.collect::<Vec<_>>().join(", "))),
+            }
+        }),
+        (Value::Object(o), Value::Str(name)) => o.field(name).ok_or_else(|| {
+            Fault::new(FaultKind::Index, format!("{} has no field `{name}`", o.type_name()))
+        }),
+        (Value::Array(_) | Value::List(_), k) => {
+            Err(Fault::type_error(format!("an array is indexed by a number, not by {}", k.type_name())))
+        }
+        (Value::Record(_), k) => {
+            Err(Fault::type_error(format!("a record is indexed by a name, not by {}", k.type_name())))
+        }
+        (b, _) => Err(Fault::type_error(format!("{} has no elements or fields", b.type_name()))),
+    }
+}
+
+fn position(base: &Value, x: f64) -> Result<Value, Fault> {
+    let len = base.len().unwrap_or(0);
+    let fail = |why: String| Err(Fault::new(FaultKind::Index, why));
+    if x != libm::trunc(x) {
+        return fail(format!("an array is indexed by a whole number, got {x}"));
+    }
+    if x < 0.0 || x >= len as f64 {
+        let range = match len {
+            0 => "it is empty".to_owned(),
+            _ => format!("its indices run from 0 to {}", len - 1),
+        };
+        return Err(Fault::new(FaultKind::Index, format!("no element {x} in an array of {len}")).with_hint(range));
+    }
+    base.element(x as usize).map_or_else(|| fail("no such element".into()), Ok)
+}
+
+/// The components of `[x, y, z]` by name, as a record.
+pub fn xyz(v: [f64; 3]) -> Value {
+    Value::Record(Arc::new(["x", "y", "z"].into_iter().map(Arc::from).zip(v.map(Value::Num)).collect()))
+}

@@ -1,0 +1,304 @@
+//! Values of the language: immutable, cheap to clone, shared by pointer.
+//!
+//! Scene things (solids, views, photographs) enter as [`Object`]s and comparators as [`Likelihood`]s, so that neither the
+//! language nor the traces know what a picture is.
+
+use crate::dist::{Datum, Dist};
+use indexmap::IndexMap;
+use std::any::Any;
+use std::fmt;
+use std::sync::Arc;
+
+/// A value.
+#[derive(Clone, Default)]
+pub enum Value {
+    /// No value: the result of a body without one.
+    #[default]
+    Unit,
+    /// A number.
+    Num(f64),
+    /// A truth value.
+    Bool(bool),
+    /// A string.
+    Str(Arc<str>),
+    /// An array of numbers.
+    Array(Arc<[f64]>),
+    /// An array with anything else in it.
+    List(Arc<[Value]>),
+    /// A record, its fields in the order written.
+    Record(Arc<Record>),
+    /// A function and the frame it was made in.
+    Closure(Closure),
+    /// A function of the table of built-ins, by index.
+    Builtin(u32),
+    /// What `mem(f)` gives.
+    Memo(NodeRef),
+    /// Random choices by key, or the results of a `map`, by reference: indexing depends on one element only.
+    Container(NodeRef),
+    /// A distribution.
+    Dist(Arc<Dist>),
+    /// A log-density in the scene without a sampler.
+    Likelihood(Arc<dyn Likelihood>),
+    /// Anything the host or the scene brings.
+    Object(Arc<dyn Object>),
+}
+
+/// The fields of a record.
+pub type Record = IndexMap<Arc<str>, Value>;
+
+/// A function value: a lowered body and the frame whose names it sees.
+#[derive(Clone, Copy, Debug, PartialEq, Eq)]
+pub struct Closure {
+    /// The function's block.
+    pub block: u32,
+    /// The frame it was made in.
+    pub frame: u32,
+}
+
+/// A reference to a node of the trace that holds structure rather than a value. The version changes whenever the set of
+/// elements does, so that equal references mean equal structure.
+#[derive(Clone, Copy, Debug, PartialEq, Eq)]
+pub struct NodeRef {
+    /// The node.
+    pub node: u32,
+    /// Its version.
+    pub version: u32,
+}
+
+/// A value the language itself knows nothing about: a solid, a camera, a view, a photograph, a host's own type.
+pub trait Object: Any + fmt::Debug + Send + Sync {
+    /// What errors and `doc` call the type.
+    fn type_name(&self) -> &'static str;
+    /// For downcasting.
+    fn as_any(&self) -> &dyn Any;
+    /// `self * other`, where the type defines it (a placement times a solid).
+    fn multiply(&self, _other: &Value) -> Option<Result<Value, String>> {
+        None
+    }
+    /// `self.name`, where the type has fields.
+    fn field(&self, _name: &str) -> Option<Value> {
+        None
+    }
+    /// One line for people, where the type has something to say of its contents.
+    fn summary(&self) -> Option<String> {
+        None
+    }
+}
+
+/// A log-density of an observed value given the scene: it scores, it has no sampler.
+///
+/// What can be prepared from the observed value alone (a distance transform) is prepared once, by the implementation,
+/// and kept with the value.
+pub trait Likelihood: fmt::Debug + Send + Sync {
+    /// What errors call it.
+    fn name(&self) -> &'static str;
+    /// The log density; never NaN.
+    ///
+    /// # Errors
+    /// When the observed value is of the wrong type or cannot be compared.
+    fn log_density(&self, observed: &Value) -> Result<f64, String>;
+    /// False when the result is not a density over observations, so that its scale is a matter of choice; the run then
+    /// says that its posterior is a pseudo-posterior.
+    fn is_proper(&self) -> bool {
+        true
+    }
+}
+
+impl Value {
+    /// An array of numbers.
+    pub fn array(xs: impl Into<Arc<[f64]>>) -> Self {
+        Value::Array(xs.into())
+    }
+
+    /// A string.
+    pub fn str(s: &str) -> Self {
+        Value::Str(Arc::from(s))
+    }
+
+    /// A record from its fields.
+    pub fn record<'a>(fields: impl IntoIterator<Item = (&'a str, Value)>) -> Self {
+        Value::Record(Arc::new(fields.into_iter().map(|(k, v)| (Arc::from(k), v)).collect()))
+    }
+
+    /// A host or scene object.
+    pub fn object(o: impl Object) -> Self {
+        Value::Object(Arc::new(o))
+    }
+
+    /// The smallest array form of these elements: numbers pack.
+    pub fn from_elements(xs: Vec<Value>) -> Self {
+        if xs.iter().all(|x| matches!(x, Value::Num(_))) {
+            Value::Array(xs.iter().map(|x| if let Value::Num(v) = x { *v } else { 0.0 }).collect())
+        } else {
+            Value::List(xs.into())
+        }
+    }
+
+    /// The object inside, if it is a `T`.
+    pub fn downcast<T: Object>(&self) -> Option<&T> {
+        match self {
+            Value::Object(o) => o.as_any().downcast_ref(),
+            _ => None,
+        }
+    }
+
+    /// What errors call its type, with an article where one reads well.
+    pub fn type_name(&self) -> &'static str {
+        match self {
+            Value::Unit => "nothing",
+            Value::Num(_) => "a number",
+            Value::Bool(_) => "a bool",
+            Value::Str(_) => "a string",
+            Value::Array(_) | Value::List(_) => "an array",
+            Value::Record(_) => "a record",
+            Value::Closure(_) | Value::Builtin(_) | Value::Memo(_) => "a function",
+            Value::Container(_) => "a keyed container",
+            Value::Dist(_) => "a distribution",
+            Value::Likelihood(_) => "a likelihood",
+            Value::Object(o) => o.type_name(),
+        }
+    }
+
+    /// The number of elements, for arrays and records.
+    pub fn len(&self) -> Option<usize> {
+        match self {
+            Value::Array(xs) => Some(xs.len()),
+            Value::List(xs) => Some(xs.len()),
+            Value::Record(r) => Some(r.len()),
+            _ => None,
+        }
+    }
+
+    /// Element `i` of an array.
+    pub fn element(&self, i: usize) -> Option<Value> {
+        match self {
+            Value::Array(xs) => xs.get(i).map(|x| Value::Num(*x)),
+            Value::List(xs) => xs.get(i).cloned(),
+            _ => None,
+        }
+    }
+
+    /// Whether two values are the same to the last bit; shared things are compared by pointer first, objects only by
+    /// pointer. Used to stop propagation: a false negative costs time, never truth.
+    pub fn same(&self, other: &Value) -> bool {
+        match (self, other) {
+            (Value::Unit, Value::Unit) => true,
+            (Value::Num(a), Value::Num(b)) => a.to_bits() == b.to_bits(),
+            (Value::Bool(a), Value::Bool(b)) => a == b,
+            (Value::Str(a), Value::Str(b)) => a == b,
+            (Value::Array(a), Value::Array(b)) => {
+                Arc::ptr_eq(a, b)
+                    || (a.len() == b.len() && a.iter().zip(b.iter()).all(|(x, y)| x.to_bits() == y.to_bits()))
+            }
+            (Value::List(a), Value::List(b)) => {
+                Arc::ptr_eq(a, b) || (a.len() == b.len() && a.iter().zip(b.iter()).all(|(x, y)| x.same(y)))
+            }
+            (Value::Record(a), Value::Record(b)) => {
+                Arc::ptr_eq(a, b)
+                    || (a.len() == b.len()
+                        && a.iter().zip(b.iter()).all(|((ka, x), (kb, y))| ka == kb && x.same(y)))
+            }
+            (Value::Closure(a), Value::Closure(b)) => a == b,
+            (Value::Builtin(a), Value::Builtin(b)) => a == b,
+            (Value::Memo(a), Value::Memo(b)) | (Value::Container(a), Value::Container(b)) => a == b,
+            (Value::Dist(a), Value::Dist(b)) => Arc::ptr_eq(a, b),
+            (Value::Likelihood(a), Value::Likelihood(b)) => Arc::ptr_eq(a, b),
+            (Value::Object(a), Value::Object(b)) => Arc::ptr_eq(a, b),
+            _ => false,
+        }
+    }
+
+    /// The value of a random choice.
+    pub fn from_datum(d: &Datum) -> Self {
+        match d {
+            Datum::Num(x) => Value::Num(*x),
+            Datum::Bool(b) => Value::Bool(*b),
+            Datum::Vec(xs) => Value::Array(Arc::clone(xs)),
+            Datum::List(xs) => Value::List(xs.iter().map(Value::from_datum).collect()),
+        }
+    }
+
+    /// The other way round, for values a distribution can draw.
+    pub fn to_datum(&self) -> Option<Datum> {
+        match self {
+            Value::Num(x) => Some(Datum::Num(*x)),
+            Value::Bool(b) => Some(Datum::Bool(*b)),
+            Value::Array(xs) => Some(Datum::Vec(Arc::clone(xs))),
+            Value::List(xs) => xs.iter().map(Value::to_datum).collect::<Option<Arc<[_]>>>().map(Datum::List),
+            _ => None,
+        }
+    }
+}
+
+impl From<f64> for Value {
+    fn from(x: f64) -> Self {
+        Value::Num(x)
+    }
+}
+
+impl From<bool> for Value {
+    fn from(x: bool) -> Self {
+        Value::Bool(x)
+    }
+}
+
+impl From<&str> for Value {
+    fn from(x: &str) -> Self {
+        Value::str(x)
+    }
+}
+
+impl fmt::Debug for Value {
+    fn fmt(&self, f: &mut fmt::Formatter<'_>) -> fmt::Result {
+        fmt::Display::fmt(self, f)
+    }
+}
+
+/// At most this many elements of an array are printed.
+const PRINTED: usize = 8;
+
+fn write_list<T>(
+    f: &mut fmt::Formatter<'_>,
+    xs: &[T],
+    mut each: impl FnMut(&mut fmt::Formatter<'_>, &T) -> fmt::Result,
+) -> fmt::Result {
+    write!(f, "[")?;
+    for (i, x) in xs.iter().take(PRINTED).enumerate() {
+        if i > 0 {
+            write!(f, ", ")?;
+        }
+        each(f, x)?;
+    }
+    if xs.len() > PRINTED {
+        write!(f, ", … {} in all", xs.len())?;
+    }
+    write!(f, "]")
+}
+
+impl fmt::Display for Value {
+    fn fmt(&self, f: &mut fmt::Formatter<'_>) -> fmt::Result {
+        match self {
+            Value::Unit => write!(f, "nothing"),
+            Value::Num(x) => write!(f, "{x}"),
+            Value::Bool(b) => write!(f, "{b}"),
+            Value::Str(s) => write!(f, "{s:?}"),
+            Value::Array(xs) => write_list(f, xs, |f, x| write!(f, "{x}")),
+            Value::List(xs) => write_list(f, xs, |f, x| write!(f, "{x}")),
+            Value::Record(r) => {
+                write!(f, "{{ ")?;
+                for (i, (k, v)) in r.iter().enumerate() {
+                    write!(f, "{}{k}: {v}", if i > 0 { ", " } else { "" })?;
+                }
+                write!(f, " }}")
+            }
+            Value::Closure(_) | Value::Builtin(_) | Value::Memo(_) => write!(f, "a function"),
+            Value::Container(_) => write!(f, "a keyed container"),
+            Value::Dist(d) => write!(f, "{d:?}"),
+            Value::Likelihood(l) => write!(f, "the likelihood {}", l.name()),
+            Value::Object(o) => match o.summary() {
+                Some(s) => write!(f, "{} ({s})", o.type_name()),
+                None => write!(f, "{}", o.type_name()),
+            },
+        }
+    }
+}

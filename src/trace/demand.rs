@@ -1,0 +1,224 @@
+//! The second half of an update: running what is asked for.
+//!
+//! Evaluation is by need and keeps its own stack, so that recursion in a program never becomes recursion here. A stale node
+//! first brings what it reads up to date, in an order in which structure comes before what depends on it, and runs again
+//! only if something it reads has changed.
+
+use super::graph::Graph;
+use super::journal::Entry;
+use super::node::*;
+use crate::lang::code::{Code, Op};
+use crate::lang::error::{FaultKind, RunError};
+use crate::lang::value::Value;
+use smallvec::SmallVec;
+
+/// What became of one attempt to evaluate a node.
+pub(crate) enum Step {
+    /// It has its value.
+    Done,
+    /// It waits for the nodes it put on the stack.
+    Wait,
+}
+
+/// A failure with its place.
+pub(crate) type Failure = Box<RunError>;
+
+impl Graph {
+    /// Finishes an update: runs new and stale effects, drops what nothing holds, re-scores absorbing choices.
+    pub fn settle(&mut self, code: &Code) -> Result<(), Failure> {
+        loop {
+            self.run_effects(code)?;
+            self.sweep(code);
+            let Some(n) = self.stale_choices.pop() else { break };
+            if self.nodes[n as usize].state == State::Stale {
+                self.run_in_place(code, n)?;
+            }
+        }
+        self.check_duplicates(code)
+    }
+
+    fn run_effects(&mut self, code: &Code) -> Result<(), Failure> {
+        let mut stale = std::mem::take(&mut self.stale_effects);
+        let mut result = Ok(());
+        for n in stale.drain(..) {
+            if self.nodes[n as usize].state == State::Stale {
+                result = self.run_in_place(code, n);
+                if result.is_err() {
+                    break;
+                }
+            }
+        }
+        self.stale_effects = stale;
+        result?;
+        let mut next = 0;
+        while next < self.effects.len() {
+            let n = self.effects[next];
+            next += 1;
+            if self.nodes[n as usize].state == State::Empty && self.nodes[n as usize].refs > 0 {
+                self.run_in_place(code, n)?;
+            }
+        }
+        self.effects.clear();
+        Ok(())
+    }
+
+    /// Runs an effect or choice, unless an owner on the way to it lets its frame go: outer ones decide whether inner ones
+    /// still exist.
+    fn run_in_place(&mut self, code: &Code, n: NodeId) -> Result<(), Failure> {
+        let mut owners: SmallVec<[NodeId; 8]> = SmallVec::new();
+        let mut f = self.nodes[n as usize].frame;
+        while self.frames[f as usize].owner != NONE {
+            let owner = self.frames[f as usize].owner;
+            owners.push(owner);
+            f = self.nodes[owner as usize].frame;
+        }
+        while let Some(owner) = owners.pop() {
+            if self.nodes[owner as usize].state == State::Stale {
+                self.demand(code, owner)?;
+            }
+            let below = owners.last().copied().unwrap_or(n);
+            if !self.frames[self.nodes[below as usize].frame as usize].attached {
+                return Ok(());
+            }
+        }
+        self.demand(code, n)
+    }
+
+    /// Brings a node up to date.
+    pub fn demand(&mut self, code: &Code, root: NodeId) -> Result<(), Failure> {
+        let bottom = self.stack.len();
+        self.stack.push(root);
+        while self.stack.len() > bottom {
+            let n = self.stack[self.stack.len() - 1];
+            match self.nodes[n as usize].state {
+                State::Clean => {
+                    self.stack.pop();
+                    continue;
+                }
+                State::Running => {}
+                state => {
+                    self.save(n);
+                    let node = &mut self.nodes[n as usize];
+                    node.state = State::Running;
+                    if state == State::Stale {
+                        node.flags |= WAS_STALE;
+                    }
+                }
+            }
+            match self.step(code, n) {
+                Ok(Step::Done) => {}
+                Ok(Step::Wait) => {}
+                Err(e) => {
+                    self.stack.truncate(bottom);
+                    return Err(e);
+                }
+            }
+        }
+        Ok(())
+    }
+
+    /// Puts a node that is needed on the stack.
+    pub fn need(&mut self, code: &Code, n: NodeId) -> Result<Step, Failure> {
+        if self.nodes[n as usize].state == State::Running {
+            let message = match self.name_of(code, n) {
+                Some(name) => format!("`{name}` needs its own value"),
+                None => "this value needs itself".to_owned(),
+            };
+            return Err(self.fail(code, n, FaultKind::Cycle, message, None));
+        }
+        self.stack.push(n);
+        Ok(Step::Wait)
+    }
+
+    /// Ends the evaluation of a node with a value.
+    pub fn finish(&mut self, code: &Code, n: NodeId, value: Value) -> Step {
+        let epoch = self.epoch;
+        let node = &mut self.nodes[n as usize];
+        if node.flags & WAS_STALE == 0 || !value.same(&node.value) {
+            node.value = value;
+            node.changed = epoch;
+        }
+        self.settle_node(code, n)
+    }
+
+    /// Ends the evaluation of a node whose value stays.
+    pub fn settle_node(&mut self, code: &Code, n: NodeId) -> Step {
+        let node = &mut self.nodes[n as usize];
+        node.state = State::Clean;
+        node.flags &= !WAS_STALE;
+        if node.flags & HELD == 0 {
+            node.flags |= HELD;
+            let mut deps: SmallVec<[(NodeId, bool); 8]> = SmallVec::new();
+            self.each_dep(code, n, |d, outside| deps.push((d, outside)));
+            for (d, outside) in deps {
+                self.acquire(d, n, outside);
+            }
+        }
+        Step::Done
+    }
+
+    /// Replaces what a node holds besides its operands.
+    pub fn set_deps(&mut self, n: NodeId, deps: Deps) {
+        let held = self.nodes[n as usize].flags & HELD != 0;
+        let old = match self.nodes[n as usize].side.as_deref() {
+            Some(Side::Deps(old)) => old.clone(),
+            Some(Side::Choice(c)) => c.deps.clone(),
+            Some(Side::Total(t)) => t.deps.clone(),
+            _ => Deps::new(),
+        };
+        if old == deps {
+            return;
+        }
+        if held {
+            deps.iter().for_each(|d| self.acquire(*d, n, true));
+            old.iter().for_each(|d| self.release(*d, true));
+        }
+        match self.nodes[n as usize].side.as_deref_mut() {
+            Some(Side::Choice(c)) => {
+                self.journal.push(Entry::Choice(n, c.clone()));
+                c.deps = deps;
+            }
+            Some(Side::Total(t)) => {
+                self.journal.push(Entry::Total(n, t.clone()));
+                t.deps = deps;
+            }
+            _ => self.set_side(n, if deps.is_empty() { None } else { Some(Side::Deps(deps)) }),
+        }
+    }
+
+    /// One attempt to evaluate a node.
+    fn step(&mut self, code: &Code, n: NodeId) -> Result<Step, Failure> {
+        if self.nodes[n as usize].flags & WAS_STALE != 0 && self.incremental {
+            let mut changed = false;
+            let mut wait = NONE;
+            let epoch = self.epoch;
+            self.each_dep(code, n, |d, _| {
+                let dep = &self.nodes[d as usize];
+                if !changed && wait == NONE {
+                    if dep.state != State::Clean {
+                        wait = d;
+                    } else if dep.changed == epoch {
+                        changed = true;
+                    }
+                }
+            });
+            if !changed {
+                if wait != NONE {
+                    return self.need(code, wait);
+                }
+                // Elements of passes read their owner, and targets their pending change.
+                let op = self.op(code, n);
+                let reads_more = matches!(op, Op::Item | Op::Accumulator | Op::Param { .. });
+                if !reads_more && self.nodes[n as usize].flags & TARGET == 0 {
+                    return Ok(self.settle_node(code, n));
+                }
+            }
+        }
+        let step = self.evaluate(code, n)?;
+        if let (Step::Done, Some(log)) = (&step, &mut self.watched) {
+            let f = &self.frames[self.nodes[n as usize].frame as usize];
+            log.push((f.block, n - f.base));
+        }
+        Ok(step)
+    }
+}

@@ -1,0 +1,400 @@
+//! `for`, `map` and `fold`: one frame a pass, made when something asks for it.
+
+use crate::lang::code::{BlockKind, Code, Op, Operand};
+use crate::lang::error::{Fault, FaultKind};
+use crate::lang::key::Key;
+use crate::lang::value::{NodeRef, Value};
+use crate::trace::demand::{Failure, Step};
+use crate::trace::graph::Graph;
+use crate::trace::journal::Entry;
+use crate::trace::node::*;
+use rustc_hash::FxHashMap;
+use smallvec::SmallVec;
+use std::sync::Arc;
+
+impl Graph {
+    /// The element a pass is for.
+    pub(super) fn evaluate_item(&mut self, code: &Code, n: NodeId) -> Result<Step, Failure> {
+        let frame = &self.frames[self.nodes[n as usize].frame as usize];
+        let (owner, pass) = (frame.owner, frame.pass as usize);
+        if self.nodes[owner as usize].state == State::Stale {
+            return self.need(code, owner);
+        }
+        let value = match self.nodes[owner as usize].side.as_deref() {
+            Some(Side::Loop(l)) => l.items.element(pass).unwrap_or_default(),
+            _ => Value::Unit,
+        };
+        Ok(self.finish(code, n, value))
+    }
+
+    /// The running value of a `fold` before a pass.
+    pub(super) fn evaluate_accumulator(&mut self, code: &Code, n: NodeId) -> Result<Step, Failure> {
+        let frame = &self.frames[self.nodes[n as usize].frame as usize];
+        let (owner, pass) = (frame.owner, frame.pass as usize);
+        let home = self.nodes[owner as usize].frame;
+        let (from, operand) = if pass == 0 {
+            let Op::Fold { init, .. } = self.op(code, owner) else { return Ok(self.finish(code, n, Value::Unit)) };
+            (home, *init)
+        } else {
+            let previous = self.pass_frame(code, owner, pass - 1)?;
+            match code.blocks[self.frames[previous as usize].block as usize].result {
+                Some(r) => (previous, r),
+                None => return Ok(self.finish(code, n, Value::Unit)),
+            }
+        };
+        if let Some(m) = self.unready(from, operand) {
+            return self.need(code, m);
+        }
+        let value = self.value(code, from, operand).clone();
+        self.set_deps(n, self.resolve(from, operand).into_iter().collect());
+        Ok(self.finish(code, n, value))
+    }
+
+    pub(super) fn evaluate_for(&mut self, code: &Code, n: NodeId, iter: Operand, body: u32) -> Result<Step, Failure> {
+        let frame = self.nodes[n as usize].frame;
+        if let Some(step) = self.await_plain(code, n, frame, &[iter])? {
+            return Ok(step);
+        }
+        let mut deps = Deps::new();
+        let over = self.plain(code, frame, iter, &mut deps);
+        let (items, keys) = match over {
+            Value::Record(r) => {
+                let names: Vec<Value> = r.keys().map(|k| Value::Str(Arc::clone(k))).collect();
+                let items = Value::List(names.into());
+                let keys = for_keys(&items);
+                (items, keys)
+            }
+            v @ (Value::Array(_) | Value::List(_)) => (v.clone(), for_keys(v)),
+            v => {
+                let message = format!("`for` runs over an array, a range or a record, not over {}", v.type_name());
+                return Err(self.type_error(code, n, message));
+            }
+        };
+        let keys = keys.map_err(|e| self.fault(code, n, e))?;
+        self.set_loop(code, n, keys, items, body, frame, deps)?;
+        if code.blocks[self.frames[frame as usize].block as usize].is_effect[self.slot(n) as usize] {
+            self.make_all_passes(code, n)?;
+        }
+        Ok(self.finish_structure(code, n))
+    }
+
+    pub(super) fn evaluate_map(
+        &mut self,
+        code: &Code,
+        n: NodeId,
+        f: Operand,
+        over: Operand,
+        _site: u32,
+    ) -> Result<Step, Failure> {
+        let frame = self.nodes[n as usize].frame;
+        if let Some(step) = self.await_all(code, frame, &[f])? {
+            return Ok(step);
+        }
+        if let Some(step) = self.await_plain(code, n, frame, &[over])? {
+            return Ok(step);
+        }
+        let mut deps = Deps::new();
+        let xs = self.plain(code, frame, over, &mut deps);
+        let (items, keys) = match map_keys(xs) {
+            Ok(pair) => pair,
+            Err(e) => return Err(self.fault(code, n, e)),
+        };
+        let (block, parent) = match self.value(code, frame, f) {
+            Value::Closure(c) => (c.block, c.frame),
+            Value::Builtin(i) => {
+                let builtin = code.builtins.get(*i);
+                let results: Result<Vec<Value>, Fault> = (0..keys.len())
+                    .map(|i| super::apply(builtin, &[&items.element(i).unwrap_or_default()]))
+                    .collect();
+                let results = results.map_err(|e| self.fault(code, n, e))?;
+                let value = match keys {
+                    Keys::Listed { ref keys, .. } if matches!(xs, Value::Record(_)) => {
+                        let names = keys.iter().map(|k| Arc::from(k.to_string()));
+                        Value::Record(Arc::new(names.zip(results).collect()))
+                    }
+                    _ => Value::from_elements(results),
+                };
+                if matches!(self.nodes[n as usize].side.as_deref(), Some(Side::Loop(_))) {
+                    self.let_side_go(code, n);
+                }
+                self.set_deps(n, deps);
+                return Ok(self.finish(code, n, value));
+            }
+            v => {
+                let message = format!("map: needs a function, got {}", v.type_name());
+                let hint = matches!(v, Value::Memo(_)).then(|| "wrap it: fn(x) { f(x) }".to_owned());
+                return Err(self.fail(code, n, FaultKind::Type, message, hint));
+            }
+        };
+        self.check_callback(code, n, "map", block, 1)?;
+        self.set_loop(code, n, keys, items, block, parent, deps)?;
+        if self.is_effect(code, n) {
+            self.make_all_passes(code, n)?;
+        }
+        Ok(self.finish_structure(code, n))
+    }
+
+    pub(super) fn evaluate_fold(
+        &mut self,
+        code: &Code,
+        n: NodeId,
+        f: Operand,
+        init: Operand,
+        over: Operand,
+        _site: u32,
+    ) -> Result<Step, Failure> {
+        let frame = self.nodes[n as usize].frame;
+        if let Some(step) = self.await_all(code, frame, &[f])? {
+            return Ok(step);
+        }
+        if let Some(step) = self.await_plain(code, n, frame, &[over])? {
+            return Ok(step);
+        }
+        let mut deps = Deps::new();
+        let (items, keys) = match map_keys(self.plain(code, frame, over, &mut deps)) {
+            Ok(pair) => pair,
+            Err(e) => return Err(self.fault(code, n, e)),
+        };
+        let (block, parent) = match self.value(code, frame, f) {
+            Value::Closure(c) => (c.block, c.frame),
+            v => {
+                let message = format!("fold: needs a function of your own, got {}", v.type_name());
+                return Err(self.type_error(code, n, message));
+            }
+        };
+        self.check_callback(code, n, "fold", block, 2)?;
+        self.set_loop(code, n, keys, items, block, parent, deps)?;
+        let passes = match self.nodes[n as usize].side.as_deref() {
+            Some(Side::Loop(l)) => l.frames.len(),
+            _ => 0,
+        };
+        let (from, operand) = match passes.checked_sub(1) {
+            None => (frame, Some(init)),
+            Some(last) => {
+                // All passes exist, so that a change finds its way to the next one.
+                self.make_all_passes(code, n)?;
+                let f = self.pass_frame(code, n, last)?;
+                (f, code.blocks[self.frames[f as usize].block as usize].result)
+            }
+        };
+        let Some(operand) = operand else { return Ok(self.finish(code, n, Value::Unit)) };
+        if let Some(m) = self.unready(from, operand) {
+            return self.need(code, m);
+        }
+        let value = self.value(code, from, operand).clone();
+        let result = self.resolve(from, operand).unwrap_or(NONE);
+        if let Some(Side::Loop(l)) = self.nodes[n as usize].side.as_deref()
+            && l.result != result
+        {
+            let mut l = l.clone();
+            if self.nodes[n as usize].flags & HELD != 0 {
+                if result != NONE {
+                    self.acquire(result, n, true);
+                }
+                if l.result != NONE {
+                    self.release(l.result, true);
+                }
+            }
+            l.result = result;
+            self.set_side(n, Some(Side::Loop(l)));
+        }
+        Ok(self.finish(code, n, value))
+    }
+
+    fn is_effect(&self, code: &Code, n: NodeId) -> bool {
+        let f = &self.frames[self.nodes[n as usize].frame as usize];
+        code.blocks[f.block as usize].is_effect[(n - f.base) as usize]
+    }
+
+    fn check_callback(&self, code: &Code, n: NodeId, what: &str, block: u32, takes: usize) -> Result<(), Failure> {
+        match code.blocks[block as usize].signature() {
+            Some((_, params, required)) if params.len() >= takes && required <= takes => Ok(()),
+            Some((name, params, _)) => {
+                let message = format!(
+                    "{what}: calls its function with {}, but `{name}` takes {}",
+                    super::call::count(takes, "argument"),
+                    params.len()
+                );
+                Err(self.type_error(code, n, message))
+            }
+            None => Err(self.type_error(code, n, format!("{what}: needs a function"))),
+        }
+    }
+
+    /// Sets or updates the passes of a loop: passes whose key stays keep their frame.
+    #[allow(clippy::too_many_arguments)]
+    fn set_loop(
+        &mut self,
+        code: &Code,
+        n: NodeId,
+        keys: Keys,
+        items: Value,
+        block: u32,
+        parent: FrameId,
+        deps: Deps,
+    ) -> Result<(), Failure> {
+        let held = self.nodes[n as usize].flags & HELD != 0;
+        let old = match self.nodes[n as usize].side.as_deref() {
+            Some(Side::Loop(l)) => Some(l.clone()),
+            _ => {
+                self.let_side_go(code, n);
+                None
+            }
+        };
+        if let Some(old) = &old
+            && old.keys == keys
+            && (old.block, old.parent) == (block, parent)
+        {
+            if !old.items.same(&items) || old.deps != deps {
+                if held {
+                    deps.iter().for_each(|d| self.acquire(*d, n, true));
+                    old.deps.iter().for_each(|d| self.release(*d, true));
+                }
+                self.set_side(n, Some(Side::Loop(Loop { items, deps, ..old.clone() })));
+            }
+            return Ok(());
+        }
+        let mut frames = vec![NONE; keys.len()];
+        let mut result = NONE;
+        if held {
+            deps.iter().for_each(|d| self.acquire(*d, n, true));
+        }
+        if let Some(old) = old {
+            let same = (old.block, old.parent) == (block, parent);
+            for (i, f) in old.frames.iter().enumerate().filter(|(_, f)| **f != NONE) {
+                match keys.find(&old.keys.get(i)).filter(|_| same) {
+                    Some(j) => {
+                        frames[j] = *f;
+                        let before = std::mem::replace(&mut self.frames[*f as usize].pass, j as u32);
+                        self.journal.push(Entry::PassMoved(*f, before));
+                    }
+                    None => self.detach(code, *f),
+                }
+            }
+            if held {
+                old.deps.iter().for_each(|d| self.release(*d, true));
+            }
+            result = old.result;
+        }
+        self.set_side(n, Some(Side::Loop(Loop { keys, items, frames, block, parent, result, deps })));
+        self.version += 1;
+        let version = self.version;
+        if let Some(Side::Loop(_)) = self.nodes[n as usize].side.as_deref()
+            && !matches!(self.op(code, n), Op::Fold { .. })
+        {
+            // The reference with the new version is the value; consumers see that the structure changed.
+            let node = &mut self.nodes[n as usize];
+            node.value = Value::Container(NodeRef { node: n, version });
+            node.changed = self.epoch;
+        }
+        Ok(())
+    }
+
+    /// Ends the evaluation of a node whose value is a reference to its structure.
+    fn finish_structure(&mut self, code: &Code, n: NodeId) -> Step {
+        self.settle_node(code, n)
+    }
+
+    fn make_all_passes(&mut self, code: &Code, n: NodeId) -> Result<(), Failure> {
+        let passes = match self.nodes[n as usize].side.as_deref() {
+            Some(Side::Loop(l)) => l.frames.len(),
+            _ => 0,
+        };
+        for i in 0..passes {
+            self.pass_frame(code, n, i)?;
+        }
+        Ok(())
+    }
+
+    /// The frame of a pass, made if nothing has asked for it before.
+    pub(crate) fn pass_frame(&mut self, code: &Code, owner: NodeId, pass: usize) -> Result<FrameId, Failure> {
+        let Some(Side::Loop(l)) = self.nodes[owner as usize].side.as_deref() else {
+            return Err(self.fail(code, owner, FaultKind::Index, "this loop has no passes".into(), None));
+        };
+        if l.frames[pass] != NONE {
+            return Ok(l.frames[pass]);
+        }
+        let (block, parent, key) = (l.block, l.parent, l.keys.get(pass));
+        let home = self.nodes[owner as usize].frame;
+        let here = &self.frames[home as usize];
+        let (path, depth, args) = match self.op(code, owner) {
+            Op::Map { site, .. } => {
+                (self.keyed_site_hash(code, home, *site, &key), here.depth + 1, Arguments::Item)
+            }
+            Op::Fold { site, .. } => {
+                (self.keyed_site_hash(code, home, *site, &key), here.depth + 1, Arguments::Fold)
+            }
+            _ => (here.path, here.depth, Arguments::None),
+        };
+        debug_assert!(!matches!(code.blocks[block as usize].kind, BlockKind::Root));
+        let frame = Frame {
+            block,
+            parent,
+            owner,
+            base: 0,
+            path,
+            depth,
+            pass: pass as u32,
+            key: Some(key),
+            args,
+            attached: true,
+        };
+        let f = self.make_frame(code, frame)?;
+        if let Some(Side::Loop(l)) = self.nodes[owner as usize].side.as_deref_mut() {
+            l.frames[pass] = f;
+        }
+        self.journal.push(Entry::PassMade(owner, pass as u32));
+        Ok(f)
+    }
+}
+
+/// Keys for `for`: the elements themselves where they are numbers, strings or bools; else the index.
+fn for_keys(items: &Value) -> Result<Keys, Fault> {
+    match items {
+        Value::Array(xs) => {
+            let start = xs.first().copied().unwrap_or(0.0);
+            if start == libm::trunc(start)
+                && start.abs() < 9e15
+                && xs.iter().enumerate().all(|(i, x)| *x == start + i as f64)
+            {
+                return Ok(Keys::Range { start: start as i64, len: xs.len() });
+            }
+            listed(xs.iter().map(|x| Key::num(*x)))
+        }
+        Value::List(xs) if xs.iter().all(|x| matches!(x, Value::Str(_) | Value::Bool(_) | Value::Num(_))) => {
+            listed(xs.iter().map(Key::from_value))
+        }
+        v => Ok(Keys::Range { start: 0, len: v.len().unwrap_or(0) }),
+    }
+}
+
+/// Keys for `map` and `fold`: the elements where they are distinct strings, a record's names, else the index.
+fn map_keys(xs: &Value) -> Result<(Value, Keys), Fault> {
+    match xs {
+        Value::Array(v) => Ok((xs.clone(), Keys::Range { start: 0, len: v.len() })),
+        Value::List(v) => {
+            let strings = !v.is_empty() && v.iter().all(|x| matches!(x, Value::Str(_)));
+            let keys = if strings { listed(v.iter().map(Key::from_value)).ok() } else { None };
+            Ok((xs.clone(), keys.unwrap_or(Keys::Range { start: 0, len: v.len() })))
+        }
+        Value::Record(r) => {
+            let keys = listed(r.keys().map(|k| Some(Key::Str(Arc::clone(k)))))?;
+            Ok((Value::List(r.values().cloned().collect()), keys))
+        }
+        v => Err(Fault::type_error(format!("needs an array or record to run over, got {}", v.type_name()))),
+    }
+}
+
+fn listed(keys: impl Iterator<Item = Option<Key>>) -> Result<Keys, Fault> {
+    let mut list: SmallVec<[Key; 8]> = SmallVec::new();
+    let mut index = FxHashMap::default();
+    for k in keys {
+        let k = k.ok_or_else(|| Fault::type_error("not a number cannot be a key"))?;
+        if index.insert(k.clone(), list.len() as u32).is_some() {
+            return Err(Fault::new(FaultKind::Duplicate, format!("the key {k} comes twice"))
+                .with_hint("loop over the indices instead: for i in 0 .. len(xs)"));
+        }
+        list.push(k);
+    }
+    Ok(Keys::Listed { keys: list.to_vec().into(), index: Arc::new(index) })
+}

@@ -1,0 +1,157 @@
+//! Evaluating one node, by the kind of its operation. One file a family.
+
+mod call;
+mod choice;
+mod container;
+mod loops;
+mod observe;
+
+use super::demand::{Failure, Step};
+use super::graph::Graph;
+use super::node::*;
+use crate::lang::builtins::{Args, Builtin, Kind};
+use crate::lang::code::{Code, Op, Operand};
+use crate::lang::error::{Fault, FaultKind};
+use crate::lang::value::{Closure, Value};
+use smallvec::SmallVec;
+
+impl Graph {
+    /// One attempt at the operation of a node.
+    pub(super) fn evaluate(&mut self, code: &Code, n: NodeId) -> Result<Step, Failure> {
+        let frame = self.nodes[n as usize].frame;
+        match self.op(code, n) {
+            Op::Param { index, default } => self.evaluate_param(code, n, *index, *default),
+            Op::Item => self.evaluate_item(code, n),
+            Op::Accumulator => self.evaluate_accumulator(code, n),
+            Op::Prim { builtin, args } => {
+                if let Some(step) = self.await_plain(code, n, frame, args)? {
+                    return Ok(step);
+                }
+                let builtin = code.builtins.get(*builtin);
+                let mut deps = Deps::new();
+                let value = {
+                    let mut values: SmallVec<[&Value; 8]> = SmallVec::new();
+                    for a in args {
+                        values.push(self.plain(code, frame, *a, &mut deps));
+                    }
+                    apply(builtin, &values)
+                };
+                let value = value.map_err(|e| self.fault(code, n, e))?;
+                self.set_deps(n, deps);
+                Ok(self.finish(code, n, value))
+            }
+            Op::Array(items) => {
+                if let Some(step) = self.await_plain(code, n, frame, items)? {
+                    return Ok(step);
+                }
+                let mut deps = Deps::new();
+                let values = items.iter().map(|o| self.plain(code, frame, *o, &mut deps).clone()).collect();
+                self.set_deps(n, deps);
+                Ok(self.finish(code, n, Value::from_elements(values)))
+            }
+            Op::Record { names, values } => {
+                if let Some(step) = self.await_plain(code, n, frame, values)? {
+                    return Ok(step);
+                }
+                let mut deps = Deps::new();
+                let fields = names.iter().zip(values.iter());
+                let fields =
+                    fields.map(|(k, o)| (k.clone(), self.plain(code, frame, *o, &mut deps).clone())).collect();
+                self.set_deps(n, deps);
+                Ok(self.finish(code, n, Value::Record(std::sync::Arc::new(fields))))
+            }
+            Op::Closure(block) => Ok(self.finish(code, n, Value::Closure(Closure { block: *block, frame }))),
+            Op::Index { base, keys } => self.evaluate_index(code, n, *base, keys),
+            Op::Call { callee, args, site } => self.evaluate_call(code, n, *callee, args, *site),
+            Op::If { cond, then, otherwise } => self.evaluate_if(code, n, *cond, *then, *otherwise),
+            Op::For { iter, body } => self.evaluate_for(code, n, *iter, *body),
+            Op::Map { f, over, site } => self.evaluate_map(code, n, *f, *over, *site),
+            Op::Fold { f, init, over, site } => self.evaluate_fold(code, n, *f, *init, *over, *site),
+            Op::Container { sources, .. } => self.evaluate_container(code, n, sources),
+            Op::Gather => self.evaluate_gather(code, n),
+            Op::Mem { f, .. } => self.evaluate_mem(code, n, *f),
+            Op::Draw { dist, site, keys } => self.evaluate_draw(code, n, dist, *site, keys),
+            Op::Observe { dist, value, .. } => self.evaluate_observe(code, n, dist, *value),
+            Op::Factor { weight, .. } => self.evaluate_factor(code, n, *weight),
+            Op::Probe(p) => {
+                let value = self.probe(*p);
+                Ok(self.finish(code, n, Value::Num(value)))
+            }
+        }
+    }
+
+    /// The node to wait for before an operand can be read.
+    pub(super) fn unready(&self, frame: FrameId, o: Operand) -> Option<NodeId> {
+        self.resolve(frame, o).filter(|n| self.nodes[*n as usize].state != State::Clean)
+    }
+
+    /// Waits for operands; `None` when all are ready.
+    pub(super) fn await_all(
+        &mut self,
+        code: &Code,
+        frame: FrameId,
+        operands: &[Operand],
+    ) -> Result<Option<Step>, Failure> {
+        for o in operands {
+            if let Some(m) = self.unready(frame, *o) {
+                return self.need(code, m).map(Some);
+            }
+        }
+        Ok(None)
+    }
+
+    /// Waits for operands, and for the elements of those that are containers.
+    pub(super) fn await_plain(
+        &mut self,
+        code: &Code,
+        _n: NodeId,
+        frame: FrameId,
+        operands: &[Operand],
+    ) -> Result<Option<Step>, Failure> {
+        for o in operands {
+            if let Some(m) = self.unready(frame, *o) {
+                return self.need(code, m).map(Some);
+            }
+            if let Value::Container(r) = self.value(code, frame, *o)
+                && self.nodes[r.node as usize + 1].state != State::Clean
+            {
+                let gather = r.node + 1;
+                return self.need(code, gather).map(Some);
+            }
+        }
+        Ok(None)
+    }
+
+    /// The value of an operand with a container read as an array or record; what was read for that goes to `deps`.
+    pub(super) fn plain<'a>(&'a self, code: &'a Code, frame: FrameId, o: Operand, deps: &mut Deps) -> &'a Value {
+        match self.value(code, frame, o) {
+            Value::Container(r) => {
+                deps.push(r.node + 1);
+                &self.nodes[r.node as usize + 1].value
+            }
+            v => v,
+        }
+    }
+
+    /// Turns a fault of a built-in into an error at a node.
+    pub(super) fn fault(&self, code: &Code, n: NodeId, f: Fault) -> Failure {
+        self.fail(code, n, f.kind, f.message, f.hint)
+    }
+
+    /// An error of the wrong type at a node.
+    pub(super) fn type_error(&self, code: &Code, n: NodeId, message: String) -> Failure {
+        self.fail(code, n, FaultKind::Type, message, None)
+    }
+}
+
+/// Calls a built-in with values.
+pub(super) fn apply(builtin: &Builtin, values: &[&Value]) -> Result<Value, Fault> {
+    let args = Args { builtin, values };
+    match builtin.kind {
+        Kind::Function(f) => f(&args),
+        Kind::Distribution(f) => f(&args).map(|d| Value::Dist(std::sync::Arc::new(d))),
+        Kind::Form(_) | Kind::Inference => {
+            Err(Fault::type_error(format!("`{}` cannot be used as a function value", builtin.name)))
+        }
+    }
+}

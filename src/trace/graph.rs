@@ -1,0 +1,487 @@
+//! The graph behind a trace: nodes, frames, who holds whom.
+//!
+//! Invariants between updates: an evaluated node holds each operand it reads, once per reading; a node that nothing holds is
+//! empty; every evaluated node that reads a node of another frame is in that node's list of outside users.
+
+use super::choices::Choices;
+use super::journal::Entry;
+use super::node::*;
+use super::propose::{Draws, Pending};
+use crate::dist::Datum;
+use crate::lang::address::ROOT_HASH;
+use crate::lang::code::{BlockKind, Callee, Code, Op, Operand};
+use crate::lang::key::Key;
+use crate::lang::error::{FaultKind, RunError};
+use crate::lang::value::Value;
+use crate::num::ExactSum;
+use rustc_hash::FxHashMap;
+use smallvec::SmallVec;
+
+/// Bounds on what a program may build.
+#[derive(Clone, Copy, Debug, PartialEq, Eq)]
+pub struct Limits {
+    /// Calls within calls.
+    pub depth: u32,
+    /// Nodes of the trace.
+    pub nodes: u32,
+}
+
+impl Default for Limits {
+    fn default() -> Self {
+        Limits { depth: 10_000, nodes: 200_000_000 }
+    }
+}
+
+/// The dependency graph of one execution.
+#[derive(Clone, Debug)]
+pub(crate) struct Graph {
+    pub nodes: Vec<Node>,
+    pub frames: Vec<Frame>,
+    pub free_frames: Vec<FrameId>,
+    /// By block: the first nodes of frames that were freed.
+    pub free_bases: Vec<Vec<NodeId>>,
+    pub outside: Vec<Outside>,
+    pub free_outside: Vec<u32>,
+    pub journal: Vec<Entry>,
+    /// The number of the current update.
+    pub epoch: u32,
+    /// Counts structural versions.
+    pub version: u32,
+    /// Nodes being evaluated.
+    pub stack: Vec<NodeId>,
+    /// Effects of new frames, to be run.
+    pub effects: Vec<NodeId>,
+    /// Effects and choices that became stale.
+    pub stale_effects: Vec<NodeId>,
+    pub stale_choices: Vec<NodeId>,
+    /// Nodes whose last holder let go in this update.
+    pub unheld: Vec<NodeId>,
+    /// Entries of `mem` functions whose last call let go in this update.
+    pub idle: Vec<(NodeId, Key)>,
+    /// Frames their owners let go in this update.
+    pub detached: Vec<FrameId>,
+    /// Lists of outside users that need tidying.
+    pub untidy: Vec<NodeId>,
+    /// The changes this update is about.
+    pub pending: Vec<Pending>,
+    /// The log prior of the choices, and the log density of observations and factors.
+    pub prior: ExactSum,
+    pub likelihood: ExactSum,
+    /// The log prior of what this update drew from the prior, and of what it would have to draw to be undone.
+    pub drawn: ExactSum,
+    pub undrawn: ExactSum,
+    /// Choices that appeared and vanished in this update.
+    pub appeared: u32,
+    pub vanished: u32,
+    pub choices: Choices,
+    pub draws: Draws,
+    /// Values that choices take when they are first drawn.
+    pub constraints: FxHashMap<u64, Datum>,
+    /// False: every update re-runs everything.
+    pub incremental: bool,
+    pub limits: Limits,
+    /// What was executed, when somebody watches.
+    pub watched: Option<Vec<(u32, u32)>>,
+}
+
+impl Graph {
+    /// The graph of a program that has not run.
+    pub fn new(code: &Code, limits: Limits) -> Self {
+        let mut g = Graph {
+            nodes: Vec::new(),
+            frames: Vec::new(),
+            free_frames: Vec::new(),
+            free_bases: vec![Vec::new(); code.blocks.len()],
+            outside: vec![Outside::default()],
+            free_outside: Vec::new(),
+            journal: Vec::new(),
+            epoch: 1,
+            version: 0,
+            stack: Vec::new(),
+            effects: Vec::new(),
+            stale_effects: Vec::new(),
+            stale_choices: Vec::new(),
+            unheld: Vec::new(),
+            idle: Vec::new(),
+            detached: Vec::new(),
+            untidy: Vec::new(),
+            pending: Vec::new(),
+            prior: ExactSum::default(),
+            likelihood: ExactSum::default(),
+            drawn: ExactSum::default(),
+            undrawn: ExactSum::default(),
+            appeared: 0,
+            vanished: 0,
+            choices: Choices::default(),
+            draws: Draws::default(),
+            constraints: FxHashMap::default(),
+            incremental: true,
+            limits,
+            watched: None,
+        };
+        let root = Frame {
+            block: 0,
+            parent: NONE,
+            owner: NONE,
+            base: 0,
+            path: ROOT_HASH,
+            depth: 0,
+            pass: 0,
+            key: None,
+            args: Arguments::None,
+            attached: true,
+        };
+        g.place_frame(code, root);
+        g
+    }
+
+    /// Puts a frame and its nodes in storage, re-using what was freed.
+    pub fn place_frame(&mut self, code: &Code, mut frame: Frame) -> FrameId {
+        let len = code.blocks[frame.block as usize].ops.len();
+        let id = self.free_frames.pop().unwrap_or(self.frames.len() as FrameId);
+        frame.base = match self.free_bases[frame.block as usize].pop() {
+            Some(base) => base,
+            None => {
+                let base = self.nodes.len() as NodeId;
+                self.nodes.resize_with(base as usize + len, Node::default);
+                base
+            }
+        };
+        for n in &mut self.nodes[frame.base as usize..frame.base as usize + len] {
+            n.frame = id;
+        }
+        if id as usize == self.frames.len() {
+            self.frames.push(frame);
+        } else {
+            self.frames[id as usize] = frame;
+        }
+        id
+    }
+
+    /// Makes a frame for `owner` as part of the current update, and queues its effects.
+    pub fn make_frame(&mut self, code: &Code, frame: Frame) -> Result<FrameId, Box<RunError>> {
+        let len = code.blocks[frame.block as usize].ops.len();
+        if frame.depth > self.limits.depth {
+            return Err(self.fail(
+                code,
+                frame.owner,
+                FaultKind::Limit,
+                format!("calls are nested more than {} deep", self.limits.depth),
+                Some("does the recursion have a base case that is reached?".into()),
+            ));
+        }
+        if self.nodes.len() + len > self.limits.nodes as usize {
+            return Err(self.fail(
+                code,
+                frame.owner,
+                FaultKind::Limit,
+                format!("the trace grew beyond {} nodes", self.limits.nodes),
+                Some("does the program loop or recurse without end?".into()),
+            ));
+        }
+        let block = frame.block as usize;
+        let id = self.place_frame(code, frame);
+        self.journal.push(Entry::FrameMade(id));
+        let base = self.frames[id as usize].base;
+        for s in &code.blocks[block].effects {
+            self.nodes[(base + s) as usize].refs = 1;
+            self.effects.push(base + s);
+        }
+        Ok(id)
+    }
+
+    /// The slot of a node in its block.
+    pub fn slot(&self, n: NodeId) -> u32 {
+        n - self.frames[self.nodes[n as usize].frame as usize].base
+    }
+
+    /// The operation a node evaluates.
+    pub fn op<'c>(&self, code: &'c Code, n: NodeId) -> &'c Op {
+        let f = &self.frames[self.nodes[n as usize].frame as usize];
+        &code.blocks[f.block as usize].ops[(n - f.base) as usize]
+    }
+
+    /// The node an operand of a frame's block refers to; `None` for constants.
+    pub fn resolve(&self, frame: FrameId, o: Operand) -> Option<NodeId> {
+        match o {
+            Operand::Const(_) => None,
+            Operand::Local(slot) => Some(self.frames[frame as usize].base + slot),
+            Operand::Outer { up, slot } => {
+                let mut f = frame;
+                for _ in 0..up {
+                    f = self.frames[f as usize].parent;
+                }
+                Some(self.frames[f as usize].base + slot)
+            }
+        }
+    }
+
+    /// The value of an operand that is evaluated.
+    pub fn value<'a>(&'a self, code: &'a Code, frame: FrameId, o: Operand) -> &'a Value {
+        match o {
+            Operand::Const(i) => code.const_value(i),
+            _ => match self.resolve(frame, o) {
+                Some(n) => &self.nodes[n as usize].value,
+                None => &Value::Unit,
+            },
+        }
+    }
+
+    /// The operand in the caller's frame that feeds a parameter, with that frame.
+    pub fn argument(&self, code: &Code, n: NodeId) -> Option<(FrameId, Operand)> {
+        let frame = &self.frames[self.nodes[n as usize].frame as usize];
+        let slot = (n - frame.base) as usize;
+        let Op::Param { index, .. } = &code.blocks[frame.block as usize].ops[slot] else { return None };
+        let i = match &frame.args {
+            Arguments::Positional(count) => (index < count).then_some(*index),
+            Arguments::Mapped(map) => map.get(*index as usize).copied().flatten(),
+            _ => None,
+        }?;
+        match self.op(code, frame.owner) {
+            Op::Call { args, .. } => Some((self.nodes[frame.owner as usize].frame, args[i as usize].1)),
+            _ => None,
+        }
+    }
+
+    /// Calls `f` with every node `n` holds, structure first, and whether the link is an outside one. The order matters: a
+    /// change of an earlier one may make the later ones irrelevant.
+    pub fn each_dep(&self, code: &Code, n: NodeId, mut f: impl FnMut(NodeId, bool)) {
+        let frame = self.nodes[n as usize].frame;
+        let op = self.op(code, n);
+        let mut operand = |o: Operand| {
+            if let Some(d) = self.resolve(frame, o) {
+                f(d, !matches!(o, Operand::Local(_)));
+            }
+        };
+        match op {
+            Op::Param { default, .. } => match self.argument(code, n) {
+                Some((af, o)) => {
+                    if let Some(d) = self.resolve(af, o) {
+                        f(d, !matches!(o, Operand::Local(_)));
+                    }
+                }
+                None if self.has_own_value(n) => {}
+                None => default.iter().copied().for_each(operand),
+            },
+            // Arguments are held by the parameters that read them.
+            Op::Call { callee, .. } => {
+                if let Callee::Value(v) = callee {
+                    operand(*v);
+                }
+            }
+            // The first running value is held by the accumulator of the first pass, if there is one.
+            Op::Fold { f: g, over, .. } => {
+                operand(*g);
+                operand(*over);
+            }
+            Op::Gather => f(n - 1, false),
+            other => other.operands(operand),
+        }
+        self.each_side_dep(code, n, f);
+    }
+
+    /// The part of [`Graph::each_dep`] that is not operands.
+    pub fn each_side_dep(&self, code: &Code, n: NodeId, mut f: impl FnMut(NodeId, bool)) {
+        match self.nodes[n as usize].side.as_deref() {
+            Some(Side::Deps(deps)) => deps.iter().for_each(|d| f(*d, true)),
+            Some(Side::Child(c)) if c.result != NONE => f(c.result, !self.is_owned_result(code, c.result, n)),
+            Some(Side::MemoCall(c)) => {
+                c.deps.iter().for_each(|d| f(*d, true));
+                if c.result != NONE {
+                    f(c.result, true);
+                }
+            }
+            Some(Side::Choice(c)) => c.deps.iter().for_each(|d| f(*d, true)),
+            Some(Side::Total(t)) => t.deps.iter().for_each(|d| f(*d, true)),
+            Some(Side::Loop(l)) => {
+                l.deps.iter().for_each(|d| f(*d, true));
+                if l.result != NONE {
+                    f(l.result, true);
+                }
+            }
+            Some(Side::Table(t)) => t.deps.iter().for_each(|d| f(*d, true)),
+            _ => {}
+        }
+    }
+
+    /// Whether a parameter's value comes with its frame rather than from an argument.
+    fn has_own_value(&self, n: NodeId) -> bool {
+        let frame = &self.frames[self.nodes[n as usize].frame as usize];
+        let i = (n - frame.base) as usize;
+        match &frame.args {
+            Arguments::Values(vs) => i < vs.len(),
+            Arguments::Item => i < 1,
+            Arguments::Fold => i < 2,
+            _ => false,
+        }
+    }
+
+    /// Whether the link from a frame's result to the frame's owner follows from the block.
+    pub fn is_owned_result(&self, code: &Code, result: NodeId, owner: NodeId) -> bool {
+        let f = &self.frames[self.nodes[result as usize].frame as usize];
+        f.owner == owner && code.blocks[f.block as usize].result == Some(Operand::Local(result - f.base))
+    }
+
+    /// Takes hold of a node.
+    pub fn acquire(&mut self, dep: NodeId, user: NodeId, outside: bool) {
+        self.save(dep);
+        self.nodes[dep as usize].refs += 1;
+        if outside {
+            let list = self.nodes[dep as usize].outside;
+            let list = if list == 0 {
+                let i = self.free_outside.pop().unwrap_or_else(|| {
+                    self.outside.push(Outside::default());
+                    self.outside.len() as u32 - 1
+                });
+                self.nodes[dep as usize].outside = i;
+                i
+            } else {
+                list
+            };
+            self.outside[list as usize].users.push(user);
+            self.journal.push(Entry::OutsideAdded(dep));
+        }
+    }
+
+    /// Lets go of a node; what nothing holds any more is emptied at the end of the update.
+    pub fn release(&mut self, dep: NodeId, outside: bool) {
+        self.save(dep);
+        let node = &mut self.nodes[dep as usize];
+        node.refs -= 1;
+        if node.refs == 0 {
+            self.unheld.push(dep);
+        }
+        if outside {
+            let list = &mut self.outside[node.outside as usize];
+            list.gone += 1;
+            if list.gone as usize * 2 > list.users.len() && list.gone > 8 {
+                self.untidy.push(dep);
+            }
+            self.journal.push(Entry::OutsideGone(dep));
+        }
+    }
+
+    /// Lets go of a frame: its effects are released, and what they alone held goes with them.
+    pub fn detach(&mut self, code: &Code, id: FrameId) {
+        let frame = &mut self.frames[id as usize];
+        if !frame.attached {
+            return;
+        }
+        frame.attached = false;
+        let (block, base) = (frame.block as usize, frame.base);
+        self.journal.push(Entry::FrameDetached(id));
+        self.detached.push(id);
+        for s in &code.blocks[block].effects {
+            self.release(base + s, false);
+        }
+    }
+
+    /// Empties every node that nothing holds.
+    pub fn sweep(&mut self, code: &Code) {
+        loop {
+            if let Some(n) = self.unheld.pop() {
+                let node = &self.nodes[n as usize];
+                if node.refs == 0 && node.state != State::Empty {
+                    self.retire(code, n);
+                }
+            } else if let Some((memo, key)) = self.idle.pop() {
+                self.drop_idle(code, memo, &key);
+            } else {
+                return;
+            }
+        }
+    }
+
+    /// Empties a node: takes back what it added to the score, lets go of what it holds.
+    fn retire(&mut self, code: &Code, n: NodeId) {
+        self.save(n);
+        let op = self.op(code, n);
+        match op {
+            Op::Draw { .. } => self.retire_choice(code, n),
+            Op::Observe { .. } | Op::Factor { .. } => self.retire_score(n),
+            _ => {}
+        }
+        if self.nodes[n as usize].flags & HELD != 0 {
+            let mut deps: SmallVec<[(NodeId, bool); 8]> = SmallVec::new();
+            self.each_dep(code, n, |d, outside| deps.push((d, outside)));
+            for (d, outside) in deps {
+                self.release(d, outside);
+            }
+        }
+        self.drop_structure(code, n);
+        let node = &mut self.nodes[n as usize];
+        node.state = State::Empty;
+        node.flags = 0;
+        node.value = Value::Unit;
+        node.score = 0.0;
+    }
+
+    /// Lets go of all a node holds besides its operands, before it takes another form.
+    pub fn let_side_go(&mut self, code: &Code, n: NodeId) {
+        if self.nodes[n as usize].flags & HELD != 0 {
+            let mut deps: SmallVec<[(NodeId, bool); 4]> = SmallVec::new();
+            self.each_side_dep(code, n, |d, outside| deps.push((d, outside)));
+            for (d, outside) in deps {
+                self.release(d, outside);
+            }
+        }
+        self.drop_structure(code, n);
+    }
+
+    /// Lets go of the frames and table entries a node owns, and of its side.
+    pub fn drop_structure(&mut self, code: &Code, n: NodeId) {
+        let Some(side) = self.swap_side(n, None) else { return };
+        match &side {
+            Side::Child(c) => self.detach(code, c.frame),
+            Side::MemoCall(c) => self.leave_memo(c.memo, &c.key),
+            Side::Loop(l) => l.frames.iter().filter(|f| **f != NONE).for_each(|f| self.detach(code, *f)),
+            Side::Memo(m) => m.entries.values().for_each(|(f, _)| self.detach(code, *f)),
+            _ => {}
+        }
+        self.journal.push(Entry::Side(n, Some(Box::new(side))));
+    }
+
+    /// Replaces a node's side without a journal entry.
+    pub fn swap_side(&mut self, n: NodeId, side: Option<Side>) -> Option<Side> {
+        std::mem::replace(&mut self.nodes[n as usize].side, side.map(Box::new)).map(|b| *b)
+    }
+
+    /// Replaces a node's side, to be restored on roll-back.
+    pub fn set_side(&mut self, n: NodeId, side: Option<Side>) {
+        let old = std::mem::replace(&mut self.nodes[n as usize].side, side.map(Box::new));
+        self.journal.push(Entry::Side(n, old));
+    }
+
+    /// An error at a node.
+    pub fn fail(
+        &self,
+        code: &Code,
+        n: NodeId,
+        kind: FaultKind,
+        message: String,
+        hint: Option<String>,
+    ) -> Box<RunError> {
+        let mut calls = Vec::new();
+        let (span, address) = if n == NONE {
+            Default::default()
+        } else {
+            let mut f = self.nodes[n as usize].frame;
+            loop {
+                let frame = &self.frames[f as usize];
+                if frame.owner == NONE {
+                    break;
+                }
+                let of = &self.frames[self.nodes[frame.owner as usize].frame as usize];
+                if let BlockKind::Function { name, .. } = &code.blocks[frame.block as usize].kind {
+                    let span = code.blocks[of.block as usize].spans[(frame.owner - of.base) as usize];
+                    calls.push((name.clone(), span));
+                }
+                f = self.nodes[frame.owner as usize].frame;
+            }
+            calls.reverse();
+            let frame = &self.frames[self.nodes[n as usize].frame as usize];
+            (code.blocks[frame.block as usize].spans[(n - frame.base) as usize], self.address_near(code, n))
+        };
+        Box::new(RunError { kind, message, span, address, calls, hint })
+    }
+}

@@ -1,0 +1,217 @@
+//! Updates that can be undone: every mutation leaves an entry, and a roll-back replays them backwards.
+//!
+//! A node's plain fields are saved once an update, before their first change; structure is saved at each change. The score
+//! sums are saved whole. Nothing is allocated in the steady state: the journal keeps its capacity.
+
+use super::graph::Graph;
+use super::node::*;
+use crate::lang::code::Code;
+use crate::lang::key::Key;
+use crate::lang::value::Value;
+use crate::num::ExactSum;
+
+/// One undoable mutation.
+#[derive(Clone, Debug)]
+pub(crate) enum Entry {
+    /// The plain fields of a node before the update.
+    Node { id: NodeId, value: Value, score: f64, refs: u32, changed: u32, state: State, flags: u8 },
+    /// A node's side before it was replaced.
+    Side(NodeId, Option<Box<Side>>),
+    /// The content of a choice's side before it changed.
+    Choice(NodeId, ChoiceSide),
+    /// The total of an observed array before it changed.
+    Total(NodeId, Total),
+    /// A frame was made.
+    FrameMade(FrameId),
+    /// A frame was let go.
+    FrameDetached(FrameId),
+    /// The frame of a pass was made when something asked for it.
+    PassMade(NodeId, u32),
+    /// A frame became that of another pass.
+    PassMoved(FrameId, u32),
+    /// An entry of a `mem` function changed.
+    Memo(NodeId, Key, Option<(FrameId, u32)>),
+    /// An outside user was added; one was marked as gone.
+    OutsideAdded(NodeId),
+    OutsideGone(NodeId),
+    /// A choice was registered, or removed from the given places.
+    ChoiceAdded(NodeId, u64),
+    ChoiceRemoved(NodeId, u64),
+    /// A target was removed from a selection at a position, or a run of them.
+    TargetRemoved { selection: u32, at: u32, target: super::choices::Target },
+    TargetsReplaced { selection: u32, before: Vec<super::choices::Target> },
+    TargetsAdded { selection: u32, count: u32 },
+    /// An address index entry was overwritten.
+    AddressShadowed(u64, NodeId),
+}
+
+/// The sums before an update.
+#[derive(Clone, Debug)]
+pub(crate) struct Before {
+    pub prior: ExactSum,
+    pub likelihood: ExactSum,
+}
+
+impl Graph {
+    /// Begins an update.
+    pub fn begin(&mut self) -> Before {
+        debug_assert!(self.journal.is_empty());
+        self.epoch = match self.epoch.checked_add(1) {
+            Some(e) => e,
+            None => {
+                for n in &mut self.nodes {
+                    n.changed = 0;
+                    n.touched = 0;
+                }
+                1
+            }
+        };
+        self.drawn = ExactSum::default();
+        self.undrawn = ExactSum::default();
+        self.appeared = 0;
+        self.vanished = 0;
+        Before { prior: self.prior.clone(), likelihood: self.likelihood.clone() }
+    }
+
+    /// Saves a node's plain fields, once an update.
+    pub fn save(&mut self, n: NodeId) {
+        let node = &mut self.nodes[n as usize];
+        if node.touched != self.epoch {
+            node.touched = self.epoch;
+            self.journal.push(Entry::Node {
+                id: n,
+                value: node.value.clone(),
+                score: node.score,
+                refs: node.refs,
+                changed: node.changed,
+                state: node.state,
+                flags: node.flags,
+            });
+        }
+    }
+
+    /// Keeps the update.
+    pub fn commit(&mut self, code: &Code) {
+        self.journal.clear();
+        let detached = std::mem::take(&mut self.detached);
+        for f in &detached {
+            self.free_frame(code, *f);
+        }
+        self.detached = detached;
+        self.forget_update();
+        while let Some(n) = self.untidy.pop() {
+            self.tidy(code, n);
+        }
+    }
+
+    /// Undoes the update.
+    pub fn rollback(&mut self, code: &Code, before: Before) {
+        while let Some(entry) = self.journal.pop() {
+            match entry {
+                Entry::Node { id, value, score, refs, changed, state, flags } => {
+                    let node = &mut self.nodes[id as usize];
+                    node.value = value;
+                    node.score = score;
+                    node.refs = refs;
+                    node.changed = changed;
+                    node.state = state;
+                    node.flags = flags;
+                }
+                Entry::Side(n, side) => self.nodes[n as usize].side = side,
+                Entry::Choice(n, old) => {
+                    if let Some(Side::Choice(c)) = self.nodes[n as usize].side.as_deref_mut() {
+                        *c = old;
+                    }
+                }
+                Entry::Total(n, old) => {
+                    if let Some(Side::Total(t)) = self.nodes[n as usize].side.as_deref_mut() {
+                        *t = old;
+                    }
+                }
+                Entry::FrameMade(f) => self.free_frame(code, f),
+                Entry::FrameDetached(f) => self.frames[f as usize].attached = true,
+                Entry::PassMade(n, pass) => {
+                    if let Some(Side::Loop(l)) = self.nodes[n as usize].side.as_deref_mut() {
+                        l.frames[pass as usize] = NONE;
+                    }
+                }
+                Entry::PassMoved(f, before) => self.frames[f as usize].pass = before,
+                Entry::Memo(n, key, old) => {
+                    if let Some(Side::Memo(m)) = self.nodes[n as usize].side.as_deref_mut() {
+                        match old {
+                            Some(e) => m.entries.insert(key, e),
+                            None => m.entries.remove(&key),
+                        };
+                    }
+                }
+                Entry::OutsideAdded(n) => {
+                    let list = self.nodes[n as usize].outside;
+                    self.outside[list as usize].users.pop();
+                }
+                Entry::OutsideGone(n) => {
+                    let list = self.nodes[n as usize].outside;
+                    self.outside[list as usize].gone -= 1;
+                }
+                Entry::ChoiceAdded(n, hash) => self.choices.undo_add(n, hash),
+                Entry::ChoiceRemoved(n, hash) => self.choices.undo_remove(n, hash),
+                Entry::TargetRemoved { selection, at, target } => self.choices.undo_target(selection, at, target),
+                Entry::TargetsReplaced { selection, before } => self.choices.undo_targets(selection, before),
+                Entry::TargetsAdded { selection, count } => self.choices.undo_added(selection, count),
+                Entry::AddressShadowed(hash, n) => self.choices.undo_shadow(hash, n),
+            }
+        }
+        self.prior = before.prior;
+        self.likelihood = before.likelihood;
+        self.forget_update();
+        self.untidy.clear();
+    }
+
+    /// Clears what belongs to one update.
+    fn forget_update(&mut self) {
+        self.stack.clear();
+        self.effects.clear();
+        self.stale_effects.clear();
+        self.stale_choices.clear();
+        self.unheld.clear();
+        self.idle.clear();
+        self.detached.clear();
+        self.pending.clear();
+        self.choices.forget_update();
+    }
+
+    /// Gives a frame's storage back.
+    fn free_frame(&mut self, code: &Code, f: FrameId) {
+        let (block, base) = (self.frames[f as usize].block as usize, self.frames[f as usize].base);
+        let end = base + code.blocks[block].ops.len() as u32;
+        for n in base..end {
+            let outside = self.nodes[n as usize].outside;
+            if outside != 0 {
+                self.outside[outside as usize].users.clear();
+                self.outside[outside as usize].gone = 0;
+                self.free_outside.push(outside);
+            }
+            self.nodes[n as usize] = Node::default();
+        }
+        self.free_bases[block].push(base);
+        self.free_frames.push(f);
+    }
+
+    /// Removes from a node's outside users those that are gone.
+    fn tidy(&mut self, code: &Code, n: NodeId) {
+        let list = self.nodes[n as usize].outside as usize;
+        if list == 0 || self.outside[list].gone as usize * 2 <= self.outside[list].users.len() {
+            return;
+        }
+        let mut users = std::mem::take(&mut self.outside[list].users);
+        users.sort_unstable();
+        users.dedup();
+        users.retain(|u| {
+            let mut reads = false;
+            if self.nodes[*u as usize].state != State::Empty {
+                self.each_dep(code, *u, |d, outside| reads |= outside && d == n);
+            }
+            reads
+        });
+        self.outside[list] = Outside { users, gone: 0 };
+    }
+}

@@ -1,0 +1,152 @@
+//! The first half of an update: marking what may have changed.
+//!
+//! Marking follows users, not values, and stops at choices: an absorbing choice keeps its value whatever its distribution
+//! becomes, so only its density is in question. The second half ([`super::demand`]) re-runs marked nodes on demand and
+//! stops where values come out equal.
+
+use super::graph::Graph;
+use super::node::*;
+use crate::lang::code::{Callee, Code, Op, Operand};
+
+impl Graph {
+    /// Marks a choice that is about to change, and everything that reads it.
+    pub fn mark_target(&mut self, code: &Code, n: NodeId) {
+        self.make_stale(code, n);
+        self.mark_users(code, n);
+        self.mark_all(code);
+    }
+
+    /// Marks every evaluated node (full re-execution).
+    pub fn mark_everything(&mut self, code: &Code) {
+        for n in 0..self.nodes.len() as NodeId {
+            if self.nodes[n as usize].state == State::Clean {
+                self.make_stale(code, n);
+            }
+        }
+    }
+
+    /// Works off the stack of nodes whose users are to be marked.
+    fn mark_all(&mut self, code: &Code) {
+        while let Some(n) = self.stack.pop() {
+            self.mark_users(code, n);
+        }
+    }
+
+    /// Marks the users of a node; those that may pass a change on go to the stack.
+    fn mark_users(&mut self, code: &Code, n: NodeId) {
+        let (frame, list) = (self.nodes[n as usize].frame as usize, self.nodes[n as usize].outside as usize);
+        let (block, base, owner) = (self.frames[frame].block as usize, self.frames[frame].base, self.frames[frame].owner);
+        let slot = n - base;
+        let block = &code.blocks[block];
+        for user in &block.users[slot as usize] {
+            self.mark_static_user(code, n, base + user);
+        }
+        for i in 0..self.outside[list].users.len() {
+            let user = self.outside[list].users[i];
+            self.mark(code, user);
+        }
+        if block.result == Some(Operand::Local(slot)) && owner != NONE {
+            match self.op(code, owner) {
+                Op::Call { .. } | Op::If { .. } => self.mark(code, owner),
+                Op::Fold { .. } => self.mark_next_pass(code, owner, frame as FrameId),
+                _ => {}
+            }
+        }
+    }
+
+    /// Marks a user in the same frame. An argument's change goes to the parameter it feeds, past the call itself.
+    fn mark_static_user(&mut self, code: &Code, n: NodeId, user: NodeId) {
+        let Op::Call { callee, args, .. } = self.op(code, user) else { return self.mark(code, user) };
+        let Some(Side::Child(child)) = self.nodes[user as usize].side.as_deref() else { return self.mark(code, user) };
+        let child = *child;
+        let frame = self.nodes[user as usize].frame;
+        if let Callee::Value(v) = callee
+            && self.resolve(frame, *v) == Some(n)
+        {
+            self.mark(code, user);
+        }
+        let base = self.frames[child.frame as usize].base;
+        for (i, (_, a)) in args.iter().enumerate() {
+            if !matches!(a, Operand::Local(_)) || self.resolve(frame, *a) != Some(n) {
+                continue;
+            }
+            let param = match &self.frames[child.frame as usize].args {
+                Arguments::Positional(_) => Some(i),
+                Arguments::Mapped(map) => map.iter().position(|m| *m == Some(i as u16)),
+                _ => None,
+            };
+            if let Some(p) = param {
+                self.mark(code, base + p as u32);
+            }
+        }
+    }
+
+    /// Marks what reads the result of a pass of a `fold`: the next pass, or the fold itself.
+    fn mark_next_pass(&mut self, code: &Code, owner: NodeId, frame: FrameId) {
+        let pass = self.frames[frame as usize].pass as usize;
+        let Some(Side::Loop(l)) = self.nodes[owner as usize].side.as_deref() else { return };
+        match l.frames.get(pass + 1) {
+            Some(next) if *next != NONE => {
+                let accumulator = self.frames[*next as usize].base;
+                self.mark(code, accumulator);
+            }
+            _ => self.mark(code, owner),
+        }
+    }
+
+    /// Marks one node, if it is evaluated and not yet marked.
+    fn mark(&mut self, code: &Code, n: NodeId) {
+        if self.nodes[n as usize].state != State::Clean {
+            return;
+        }
+        self.make_stale(code, n);
+        match self.op(code, n) {
+            Op::Draw { .. } => {
+                // A whitened choice's value moves with its distribution.
+                if let Some(Side::Choice(c)) = self.nodes[n as usize].side.as_deref()
+                    && c.stored.is_some()
+                {
+                    self.stack.push(n);
+                }
+            }
+            Op::Observe { .. } | Op::Factor { .. } => {}
+            Op::For { .. } | Op::Map { .. } | Op::Fold { .. } => {
+                self.mark_items(code, n);
+                self.stack.push(n);
+            }
+            _ => self.stack.push(n),
+        }
+    }
+
+    /// Marks the elements of a loop's passes: what it runs over may have changed.
+    fn mark_items(&mut self, code: &Code, n: NodeId) {
+        let Some(Side::Loop(l)) = self.nodes[n as usize].side.as_deref() else { return };
+        let item = u32::from(matches!(self.op(code, n), Op::Fold { .. }));
+        let passes = l.frames.len();
+        for i in 0..passes {
+            let Some(Side::Loop(l)) = self.nodes[n as usize].side.as_deref() else { return };
+            let f = l.frames[i];
+            if f != NONE {
+                let base = self.frames[f as usize].base;
+                self.mark(code, base + item);
+                if item == 1 && i == 0 {
+                    self.mark(code, base);
+                }
+            }
+        }
+    }
+
+    fn make_stale(&mut self, code: &Code, n: NodeId) {
+        self.save(n);
+        let node = &mut self.nodes[n as usize];
+        node.state = State::Stale;
+        let frame = &self.frames[node.frame as usize];
+        let slot = (n - frame.base) as usize;
+        let block = &code.blocks[frame.block as usize];
+        if block.is_effect[slot] {
+            self.stale_effects.push(n);
+        } else if matches!(block.ops[slot], Op::Draw { .. }) {
+            self.stale_choices.push(n);
+        }
+    }
+}

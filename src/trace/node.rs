@@ -1,0 +1,274 @@
+//! Nodes and frames: the storage of a trace.
+//!
+//! A frame is one instance of a block; its nodes lie side by side, one a slot. A node keeps its last value, what it adds to
+//! the score, and how many evaluated nodes (or effects) hold it. What only structural nodes need is boxed beside it.
+
+use crate::dist::Datum;
+use crate::lang::key::Key;
+use crate::lang::value::Value;
+use crate::num::ExactSum;
+use rustc_hash::FxHashMap;
+use smallvec::SmallVec;
+use std::sync::Arc;
+
+/// The index of a node.
+pub(crate) type NodeId = u32;
+/// The index of a frame.
+pub(crate) type FrameId = u32;
+
+/// No node, no frame.
+pub(crate) const NONE: u32 = u32::MAX;
+
+/// How far a node's value can be trusted.
+#[derive(Clone, Copy, Debug, Default, PartialEq, Eq)]
+pub(crate) enum State {
+    /// Not evaluated: nothing asked for it.
+    #[default]
+    Empty,
+    /// Up to date.
+    Clean,
+    /// Something it depends on may have changed.
+    Stale,
+    /// Being evaluated.
+    Running,
+}
+
+/// The node's operands are held by it.
+pub(crate) const HELD: u8 = 1;
+/// The node is a choice with a pending change.
+pub(crate) const TARGET: u8 = 2;
+/// The node's state before it began to run was [`State::Stale`].
+pub(crate) const WAS_STALE: u8 = 4;
+
+/// A node.
+#[derive(Clone, Debug, Default)]
+pub(crate) struct Node {
+    /// Its value; `nothing` while empty.
+    pub value: Value,
+    /// What it adds to the log joint, when that is one term.
+    pub score: f64,
+    /// What only structural nodes and vector choices need.
+    pub side: Option<Box<Side>>,
+    /// How many evaluated nodes and effects hold it.
+    pub refs: u32,
+    /// The epoch in which its value last changed.
+    pub changed: u32,
+    /// The epoch in which it was last saved to the journal.
+    pub touched: u32,
+    /// Its frame.
+    pub frame: FrameId,
+    /// Its list of users in other frames.
+    pub outside: u32,
+    /// How far its value can be trusted.
+    pub state: State,
+    /// [`HELD`], [`TARGET`].
+    pub flags: u8,
+}
+
+/// What only some nodes need.
+#[derive(Clone, Debug)]
+pub(crate) enum Side {
+    /// Nodes held besides the operands: the element an index found, the elements a gather read.
+    Deps(Deps),
+    /// `if` and calls of user functions.
+    Child(Child),
+    /// A call that went through `mem`.
+    MemoCall(MemoCall),
+    /// `for`, `map`, `fold`.
+    Loop(Loop),
+    /// A keyed container.
+    Table(Table),
+    /// `mem(f)`.
+    Memo(Memo),
+    /// A choice whose stored form is not its value, or that has several elements.
+    Choice(ChoiceSide),
+    /// An observed array, or an observation that reads containers.
+    Total(Total),
+}
+
+/// Nodes held besides the operands.
+pub(crate) type Deps = SmallVec<[NodeId; 4]>;
+
+/// A call that went through `mem`.
+#[derive(Clone, Debug)]
+pub(crate) struct MemoCall {
+    /// The node of the `mem` function.
+    pub memo: NodeId,
+    /// The entry.
+    pub key: Key,
+    /// The node with its result, or [`NONE`].
+    pub result: NodeId,
+    /// The arguments.
+    pub deps: Deps,
+}
+
+/// The score of an observed array.
+#[derive(Clone, Debug, Default)]
+pub(crate) struct Total {
+    /// The sum of the scores of the elements.
+    pub sum: ExactSum,
+    /// Nodes held besides the operands.
+    pub deps: Deps,
+}
+
+/// The frame of a branch or call.
+#[derive(Clone, Copy, Debug, PartialEq, Eq)]
+pub(crate) struct Child {
+    /// The frame.
+    pub frame: FrameId,
+    /// The node with its result, or [`NONE`] when that is a constant or nothing.
+    pub result: NodeId,
+}
+
+/// The passes of a loop.
+#[derive(Clone, Debug)]
+pub(crate) struct Loop {
+    /// The keys of the passes.
+    pub keys: Keys,
+    /// The elements.
+    pub items: Value,
+    /// The frames; [`NONE`] where nothing has asked for the pass yet.
+    pub frames: Vec<FrameId>,
+    /// The block of the body and its lexical parent frame.
+    pub block: u32,
+    /// See `block`.
+    pub parent: FrameId,
+    /// For `fold`: the node with the last result.
+    pub result: NodeId,
+    /// Nodes held besides the operands.
+    pub deps: Deps,
+}
+
+/// The keys of a loop's passes.
+#[derive(Clone, Debug, PartialEq)]
+pub(crate) enum Keys {
+    /// `start`, `start + 1`, …
+    Range { start: i64, len: usize },
+    /// Any distinct keys.
+    Listed { keys: Arc<[Key]>, index: Arc<FxHashMap<Key, u32>> },
+}
+
+impl Keys {
+    /// The number of passes.
+    pub fn len(&self) -> usize {
+        match self {
+            Keys::Range { len, .. } => *len,
+            Keys::Listed { keys, .. } => keys.len(),
+        }
+    }
+
+    /// The key of pass `i`.
+    pub fn get(&self, i: usize) -> Key {
+        match self {
+            Keys::Range { start, .. } => Key::Num(((start + i as i64) as f64 + 0.0).to_bits()),
+            Keys::Listed { keys, .. } => keys[i].clone(),
+        }
+    }
+
+    /// Which pass a key belongs to.
+    pub fn find(&self, key: &Key) -> Option<usize> {
+        match self {
+            Keys::Range { start, len } => {
+                let Key::Num(bits) = key else { return None };
+                let x = f64::from_bits(*bits) - *start as f64;
+                (x >= 0.0 && x < *len as f64 && x == libm::trunc(x)).then_some(x as usize)
+            }
+            Keys::Listed { index, .. } => index.get(key).map(|i| *i as usize),
+        }
+    }
+}
+
+/// Where the elements of a keyed container are.
+#[derive(Clone, Debug)]
+pub(crate) struct Table {
+    /// What was read to make it.
+    pub deps: Deps,
+    /// By key: the source and the pass of each of its loops; none when one loop's keys are the container's.
+    pub entries: Option<Arc<indexmap::IndexMap<SmallVec<[Key; 1]>, Element>>>,
+}
+
+/// Where one element of a container is drawn.
+#[derive(Clone, Debug)]
+pub(crate) struct Element {
+    /// The index of the source.
+    pub source: u32,
+    /// The pass of each loop on the way.
+    pub passes: SmallVec<[u32; 2]>,
+}
+
+/// The entries of a `mem` function.
+#[derive(Clone, Debug)]
+pub(crate) struct Memo {
+    /// The function.
+    pub block: u32,
+    /// Its lexical parent frame.
+    pub parent: FrameId,
+    /// The live entries: frame and number of calls that use it.
+    pub entries: FxHashMap<Key, (FrameId, u32)>,
+}
+
+/// What a vector choice, or one stored in another form than its value, keeps.
+#[derive(Clone, Debug, PartialEq)]
+pub(crate) struct ChoiceSide {
+    /// The stored form, if it is not the value.
+    pub stored: Option<Datum>,
+    /// The sum of the scores of the elements.
+    pub total: ExactSum,
+    /// The number of separately addressed elements; [`NONE`] when it is one choice.
+    pub elements: u32,
+    /// The hash of its address, where that is not a function of its frame.
+    pub hash: Option<u64>,
+    /// Nodes held besides the operands.
+    pub deps: Deps,
+}
+
+/// Where a function's parameters come from.
+#[derive(Clone, Debug)]
+pub(crate) enum Arguments {
+    /// Not a function's frame.
+    None,
+    /// Parameter `i` is argument `i` of the calling node.
+    Positional(u16),
+    /// Parameter `i` is this argument of the calling node, or its default.
+    Mapped(Box<[Option<u16>]>),
+    /// Parameter 0 is the element of the pass.
+    Item,
+    /// Parameter 0 is the running value, parameter 1 the element.
+    Fold,
+    /// The values themselves (`mem`).
+    Values(Arc<[Value]>),
+}
+
+/// One instance of a block.
+#[derive(Clone, Debug)]
+pub(crate) struct Frame {
+    /// The block.
+    pub block: u32,
+    /// The frame of the lexically enclosing block.
+    pub parent: FrameId,
+    /// The node that made it; [`NONE`] for the top level.
+    pub owner: NodeId,
+    /// Its first node.
+    pub base: NodeId,
+    /// The hash of the address prefix of its function's frame.
+    pub path: u64,
+    /// How many calls deep.
+    pub depth: u32,
+    /// Which pass of its owner's loop.
+    pub pass: u32,
+    /// The key of the pass, `map` element or `mem` entry.
+    pub key: Option<Key>,
+    /// Where parameters come from.
+    pub args: Arguments,
+    /// Whether its owner still wants it.
+    pub attached: bool,
+}
+
+/// The users of a node that its block does not tell.
+#[derive(Clone, Debug, Default)]
+pub(crate) struct Outside {
+    /// The users; some may have gone.
+    pub users: Vec<NodeId>,
+    /// How many have.
+    pub gone: u32,
+}

@@ -1,0 +1,155 @@
+//! From nodes to addresses. Frames keep a hash of their prefix; the address itself is spelt out when someone looks.
+
+use super::graph::Graph;
+use super::node::*;
+use crate::lang::address::{Address, AddressSegment};
+use crate::lang::code::{BlockKind, Code, Op, Operand, Site};
+use crate::lang::key::{Key, mix};
+use smallvec::SmallVec;
+use std::sync::Arc;
+
+impl Graph {
+    /// The keys of the loops around a frame, up to its function, outermost first; less those the site's target carries.
+    fn loop_keys(&self, code: &Code, frame: FrameId, carried: u32) -> SmallVec<[Key; 2]> {
+        let mut keys = SmallVec::new();
+        let mut level = 0;
+        let mut f = frame;
+        loop {
+            let here = &self.frames[f as usize];
+            match code.blocks[here.block as usize].kind {
+                BlockKind::Loop => {
+                    if carried & (1 << level) == 0 {
+                        keys.extend(here.key.clone());
+                    }
+                    level += 1;
+                }
+                BlockKind::Branch => {}
+                _ => break,
+            }
+            f = self.nodes[here.owner as usize].frame;
+        }
+        keys.reverse();
+        keys
+    }
+
+    /// The hash of the path through a site.
+    pub fn site_hash(&self, code: &Code, frame: FrameId, site: u32) -> u64 {
+        self.hash_site(code, frame, &code.sites[site as usize], None, &[])
+    }
+
+    /// The same, for an element of a `map` or an entry of `mem`.
+    pub fn keyed_site_hash(&self, code: &Code, frame: FrameId, site: u32, key: &Key) -> u64 {
+        self.hash_site(code, frame, &code.sites[site as usize], Some(key), &[])
+    }
+
+    /// The same, for a choice with keys of its own.
+    pub fn own_keyed_hash(&self, code: &Code, frame: FrameId, site: u32, own: &[Key]) -> u64 {
+        self.hash_site(code, frame, &code.sites[site as usize], None, own)
+    }
+
+    fn hash_site(&self, code: &Code, frame: FrameId, site: &Site, element: Option<&Key>, own: &[Key]) -> u64 {
+        let last = site.segments.len().saturating_sub(1);
+        let mut h = self.frames[frame as usize].path;
+        for (i, s) in site.segments.iter().enumerate() {
+            h = mix(h, s.hash);
+            if i == 0 {
+                h = self.loop_keys(code, frame, site.carried).iter().fold(h, |h, k| k.hash_into(h));
+            }
+            if i + 1 == last || last == 0 {
+                h = element.iter().fold(h, |h, k| k.hash_into(h));
+            }
+            if i == last {
+                h = own.iter().fold(h, |h, k| k.hash_into(h));
+            }
+        }
+        h
+    }
+
+    /// The segments through a site; the mirror image of [`Graph::hash_site`].
+    fn spell_site(
+        &self,
+        code: &Code,
+        frame: FrameId,
+        site: u32,
+        element: Option<&Key>,
+        own: &[Key],
+    ) -> Vec<AddressSegment> {
+        let site = &code.sites[site as usize];
+        let mut segments = self.prefix(code, frame);
+        let last = site.segments.len().saturating_sub(1);
+        for (i, s) in site.segments.iter().enumerate() {
+            let mut keys = Vec::new();
+            if i == 0 {
+                keys.extend(self.loop_keys(code, frame, site.carried));
+            }
+            if i + 1 == last || last == 0 {
+                keys.extend(element.cloned());
+            }
+            if i == last {
+                keys.extend_from_slice(own);
+            }
+            segments.push(AddressSegment { name: Arc::clone(&s.name), occurrence: s.occurrence, keys });
+        }
+        segments
+    }
+
+    /// The address prefix of a frame: the calls that lead to its function.
+    fn prefix(&self, code: &Code, frame: FrameId) -> Vec<AddressSegment> {
+        let mut f = frame;
+        loop {
+            let here = &self.frames[f as usize];
+            match code.blocks[here.block as usize].kind {
+                BlockKind::Root => return Vec::new(),
+                BlockKind::Function { .. } => {
+                    let home = self.nodes[here.owner as usize].frame;
+                    let (Op::Call { site, .. } | Op::Map { site, .. } | Op::Fold { site, .. } | Op::Mem { site, .. }) =
+                        self.op(code, here.owner)
+                    else {
+                        return Vec::new();
+                    };
+                    return self.spell_site(code, home, *site, here.key.as_ref(), &[]);
+                }
+                _ => f = self.nodes[here.owner as usize].frame,
+            }
+        }
+    }
+
+    /// The own keys of a choice.
+    pub fn own_keys(&self, code: &Code, frame: FrameId, keys: &[Operand]) -> SmallVec<[Key; 2]> {
+        keys.iter().filter_map(|k| Key::from_value(self.value(code, frame, *k))).collect()
+    }
+
+    /// The address of a choice, observation or factor.
+    pub fn address(&self, code: &Code, n: NodeId) -> Address {
+        let frame = self.nodes[n as usize].frame;
+        let segments = match self.op(code, n) {
+            Op::Draw { site, keys, .. } => {
+                let own = self.own_keys(code, frame, keys);
+                self.spell_site(code, frame, *site, None, &own)
+            }
+            Op::Observe { site, .. } | Op::Factor { site, .. } => self.spell_site(code, frame, *site, None, &[]),
+            _ => self.prefix(code, frame),
+        };
+        Address { segments }
+    }
+
+    /// The address a node is executed for: its own, or that of the choice or call around it.
+    pub fn address_near(&self, code: &Code, n: NodeId) -> Address {
+        let mut address = self.address(code, n);
+        if address.segments.is_empty()
+            && let Some(name) = self.name_of(code, n)
+        {
+            address.segments.push(AddressSegment { name, occurrence: 1, keys: Vec::new() });
+        }
+        address
+    }
+
+    /// The top-level name a node has.
+    pub fn name_of(&self, code: &Code, n: NodeId) -> Option<Arc<str>> {
+        if self.nodes[n as usize].frame != 0 {
+            return None;
+        }
+        let slot = Operand::Local(self.slot(n));
+        code.globals.iter().find(|(_, o)| **o == slot).map(|(name, _)| Arc::clone(name))
+    }
+}
