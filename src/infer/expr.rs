@@ -68,7 +68,7 @@ pub(crate) fn evaluate(e: &Expr, env: &mut Scope) -> Result<Value, Box<RunError>
             let b = evaluate(right, env)?;
             match op {
                 BinaryOp::And | BinaryOp::Or => Ok(b),
-                _ => builtin(op.symbol(), &[&a, &b], e, env),
+                _ => builtin(operator(*op), &[&a, &b], e, env),
             }
         }
         ExprKind::Call { callee, args } => {
@@ -116,4 +116,26 @@ fn builtin(name: &str, values: &[&Value], e: &Expr, env: &Scope) -> Result<Value
 
 fn unsupported(e: &Expr) -> Box<RunError> {
     fail(e.span, "this expression cannot be used in an inference block".into())
+}
+
+/// The name of the built-in behind an operator.
+fn operator(op: BinaryOp) -> &'static str {
+    match op {
+        BinaryOp::Add => "+",
+        BinaryOp::Sub => "-",
+        BinaryOp::Mul => "*",
+        BinaryOp::Div => "/",
+        BinaryOp::Rem => "%",
+        BinaryOp::Pow => "**",
+        BinaryOp::Intersect => "&",
+        BinaryOp::Eq => "==",
+        BinaryOp::Ne => "!=",
+        BinaryOp::Lt => "<",
+        BinaryOp::Le => "<=",
+        BinaryOp::Gt => ">",
+        BinaryOp::Ge => ">=",
+        BinaryOp::And => "and",
+        BinaryOp::Or => "or",
+        BinaryOp::Range => "..",
+    }
 }

@@ -39,7 +39,7 @@ pub(crate) fn selector(e: &Expr, env: &mut Scope) -> Result<Selector, Box<RunErr
             match op {
                 BinaryOp::Add => Ok(Selector::Union(a, b)),
                 BinaryOp::Sub => Ok(Selector::Minus(a, b)),
-                BinaryOp::Both => Ok(Selector::Both(a, b)),
+                BinaryOp::Intersect => Ok(Selector::Both(a, b)),
                 _ => Err(not_a_selection(e.span)),
             }
         }

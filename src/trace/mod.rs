@@ -230,7 +230,7 @@ impl Trace {
     /// A hash of the address of a choice, stable between runs.
     pub fn address_hash(&self, t: Target) -> u64 {
         let h = self.graph.choice_hash(&self.code, t.node);
-        if t.element == NONE { h } else { eval::element_hash(h, t.element as usize) }
+        if t.element == NONE { h } else { eval::choice::element_hash(h, t.element as usize) }
     }
 
     /// The value of a choice as the program sees it.
