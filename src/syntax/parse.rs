@@ -3,7 +3,7 @@
 use super::ast::{Expr, ExprKind, Program};
 use super::build::Builder;
 use super::deep::Deep;
-use super::delimiters::balance;
+use super::delimiters::{Balanced, balance};
 use super::error::{MAX_ERRORS, SyntaxError, SyntaxErrorKind};
 use super::grammar::ExpressionParser;
 use super::lexer::lex;
@@ -30,8 +30,8 @@ pub fn parse(text: &str, file: FileId) -> (Program, Vec<SyntaxError>) {
         return (Program::default(), errors);
     }
     let mut balanced = balance(text, file, lexemes);
-    errors.append(&mut balanced.errors);
-    let program = parse_program(Tokens::new(text, file, balanced), &mut errors);
+    add_brackets(&mut errors, &mut balanced);
+    let program = parse_program(Tokens::new(text, file, "end of the file", balanced), &mut errors);
     errors.sort_by_key(|e| (e.span.start, e.span.end));
     (program, errors)
 }
@@ -57,14 +57,14 @@ pub(crate) fn parse_range(text: &str, range: Range<usize>, file: FileId, level: 
     let text = &text[..range.end];
     let (lexemes, mut errors) = lex(text, range, file, level);
     let mut balanced = balance(text, file, lexemes);
-    errors.append(&mut balanced.errors);
-    let tokens = Tokens::new(text, file, balanced);
+    add_brackets(&mut errors, &mut balanced);
+    let tokens = Tokens::new(text, file, if level == 0 { "end of the text" } else { "end of the key" }, balanced);
     let mut builder = Builder::new(file);
     let expr = match ExpressionParser::new().parse(&mut builder, tokens.iter()) {
         Ok(expr) => expr,
         Err(error) => {
             if errors.is_empty() {
-                errors.push(tokens.explain(&error, 0));
+                errors.push(tokens.explain(&error));
             }
             hole
         }
@@ -72,4 +72,18 @@ pub(crate) fn parse_range(text: &str, range: Range<usize>, file: FileId, level: 
     errors.append(&mut builder.errors);
     errors.sort_by_key(|e| (e.span.start, e.span.end));
     (expr, errors)
+}
+
+/// Adds the errors about brackets, but for those that a lexeme without an end may have swallowed.
+fn add_brackets(errors: &mut Vec<SyntaxError>, balanced: &mut Balanced<'_>) {
+    use SyntaxErrorKind::{Address, UnterminatedComment, UnterminatedString};
+    let swallows = |e: &&SyntaxError| matches!(e.kind, UnterminatedString | UnterminatedComment | Address(_));
+    let swallowed: Vec<u32> = errors.iter().filter(swallows).map(|e| e.span.start).collect();
+    errors.extend(balanced.errors.drain(..).filter(|e| match &e.kind {
+        SyntaxErrorKind::Unclosed { before, .. } => {
+            let end = before.as_ref().map_or(u32::MAX, |(_, place)| place.start);
+            !swallowed.iter().any(|start| (e.span.start..end).contains(start))
+        }
+        _ => true,
+    }));
 }
