@@ -9,7 +9,7 @@ use super::span::Span;
 use super::token::Foreign;
 use crate::diag::{Diagnostic, IntoDiagnostic, too_large};
 
-/// At most this many errors are reported for a text.
+/// At most this many errors are reported for a text, and then that there are more.
 pub const MAX_ERRORS: usize = 20;
 
 /// An error in a text, and where.
@@ -161,7 +161,7 @@ impl IntoDiagnostic for SyntaxError {
                 .hint("add `else { … }`, or end the expression with `;`"),
             DrawTarget => error("only a name can be drawn", "this is no name")
                 .hint("write `x ~ d;` or, with a key, `x[k] ~ d;`; what is known is observed: `observe d = v;`"),
-            TooManyErrors => error("too many errors", "the text from here on was not checked"),
+            TooManyErrors => error("too many errors", "from here on they are not shown"),
         }
     }
 }

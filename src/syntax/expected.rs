@@ -9,8 +9,7 @@ const EXPRESSION: [&str; 17] = [
     "to", "when", "coarse",
 ];
 /// Tokens that go on with an expression.
-const OPERATOR: [&str; 16] =
-    ["or", "and", "==", "!=", "<", "<=", ">", ">=", "..", "+", "-", "*", "/", "%", "&", "**"];
+const OPERATOR: [&str; 16] = ["or", "and", "==", "!=", "<", "<=", ">", ">=", "..", "+", "-", "*", "/", "%", "&", "**"];
 /// Tokens that go on with a name or call.
 const SUFFIX: [&str; 3] = ["(", "[", "."];
 
@@ -88,7 +87,7 @@ mod tests {
         assert_eq!(of(&EXPRESSION), "an expression");
         assert_eq!(of(&[&OPERATOR[..], &SUFFIX, &[";", "~", "a bad statement"]].concat()), "`;`, `~` or an operator");
         assert_eq!(of(&["let", "for", "a number", "(", "}"]), "`}` or a statement");
-        assert_eq!(of(&["a name", "to", "when", "{"]), "`{` or a name");
+        assert_eq!(of(&["a name", "to", "when", "{"]), "a name or `{`");
         assert_eq!(of(&[]), "the end of the text");
     }
 }

@@ -71,7 +71,7 @@ pub(crate) fn lex(text: &str, range: Range<usize>, file: FileId, level: u32) -> 
             lexemes.clear();
             break;
         }
-        if lexer.errors.len() >= MAX_ERRORS {
+        if lexer.errors.len() > MAX_ERRORS {
             // Not a program, or one that needs repair before more is said about it.
             break;
         }

@@ -17,23 +17,20 @@ use std::ops::Range;
 /// The program holds what could be parsed: where a statement could not, it has an expression statement of
 /// [`ExprKind::Error`]. Without errors it holds no such expression, and its tree is no deeper than
 /// [`MAX_DEPTH`](super::MAX_DEPTH).
-/// The errors, at most a few more than [`MAX_ERRORS`], are in the order of the text.
+/// The errors are in the order of the text; after [`MAX_ERRORS`] of them comes [`SyntaxErrorKind::TooManyErrors`].
 pub fn parse(text: &str, file: FileId) -> (Program, Vec<SyntaxError>) {
     if text.len() > MAX_SOURCE_BYTES {
         let error = SyntaxError::new(SyntaxErrorKind::TooLarge(text.len()), Span::new(file, 0, 0));
         return (Program::default(), vec![error]);
     }
     let (lexemes, mut errors) = lex(text, 0..text.len(), file, 0);
-    if errors.len() >= MAX_ERRORS {
-        let end = errors.last().map_or(0, |e| e.span.end as usize);
-        errors.push(SyntaxError::new(SyntaxErrorKind::TooManyErrors, Span::new(file, end, end)));
-        return (Program::default(), errors);
-    }
     let mut balanced = balance(text, file, lexemes);
     add_brackets(&mut errors, &mut balanced);
-    let program = parse_program(Tokens::new(text, file, "end of the file", balanced), &mut errors);
-    errors.sort_by_key(|e| (e.span.start, e.span.end));
-    (program, errors)
+    let mut program = Program::default();
+    if errors.len() <= MAX_ERRORS {
+        program = parse_program(Tokens::new(text, file, "end of the file", balanced), &mut errors);
+    }
+    (program, finish(errors))
 }
 
 /// Parses one expression: a value given to `--set`, a line of the REPL.
@@ -70,8 +67,31 @@ pub(crate) fn parse_range(text: &str, range: Range<usize>, file: FileId, level: 
         }
     };
     errors.append(&mut builder.errors);
+    (expr, finish(errors))
+}
+
+/// The errors in the order of the text, and no more than are useful.
+fn finish(mut errors: Vec<SyntaxError>) -> Vec<SyntaxError> {
     errors.sort_by_key(|e| (e.span.start, e.span.end));
-    (expr, errors)
+    // A `}` that nothing opened follows from a `{` that was expected before.
+    let mut missing = 0_usize;
+    errors.retain(|e| match &e.kind {
+        SyntaxErrorKind::Unexpected { expected, .. } if expected.contains("`{`") => {
+            missing += 1;
+            true
+        }
+        SyntaxErrorKind::StrayClose('}') if missing > 0 => {
+            missing -= 1;
+            false
+        }
+        _ => true,
+    });
+    if let Some(next) = errors.get(MAX_ERRORS) {
+        let span = next.span;
+        errors.truncate(MAX_ERRORS);
+        errors.push(SyntaxError::new(SyntaxErrorKind::TooManyErrors, span));
+    }
+    errors
 }
 
 /// Adds the errors about brackets, but for those that a lexeme without an end may have swallowed.

@@ -192,9 +192,8 @@ impl<'s> Tokens<'s> {
     }
 
     fn drop_statement(&mut self, range: Range<usize>) {
-        if let Some(first) = self.lexemes.get_mut(range.start) {
-            first.token = Token::Bad;
-        }
+        self.lexemes[range.start].token = Token::Bad;
+        self.lexemes[range.start].end = self.lexemes[range.end - 1].end;
         self.dropped[range.start + 1..range.end].fill(true);
     }
 }
@@ -212,10 +211,6 @@ pub(crate) fn parse_program(mut tokens: Tokens<'_>, errors: &mut Vec<SyntaxError
             Err(error) => error,
         };
         let (at, expected) = tokens.misfit(&error);
-        if errors.len() >= MAX_ERRORS {
-            errors.push(SyntaxError::new(SyntaxErrorKind::TooManyErrors, tokens.span_at(at)));
-            return Program::default();
-        }
         let statement = tokens.statement(at, is_statement(&names(expected)));
         let start = statement.as_ref().map_or(at, |s| s.start);
         let semicolon = tokens.lacks_semicolon(at, expected);
@@ -230,6 +225,9 @@ pub(crate) fn parse_program(mut tokens: Tokens<'_>, errors: &mut Vec<SyntaxError
             Some(range) => tokens.drop_statement(range),
             // Nothing is left to give up.
             None => return Program::default(),
+        }
+        if errors.len() > MAX_ERRORS {
+            return Program::default();
         }
     }
 }

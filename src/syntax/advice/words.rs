@@ -54,7 +54,8 @@ impl Rules<'_, '_> {
         let found = self.found()?;
         let word = self.text(self.context.at);
         if *found == Token::Else && !self.expects("in") {
-            let semicolon = matches!(self.back(1), Some(Token::Semi | Token::Bad)) && self.back(2) == Some(&Token::RBrace);
+            let semicolon =
+                matches!(self.back(1), Some(Token::Semi | Token::Bad)) && self.back(2) == Some(&Token::RBrace);
             let hint = if semicolon {
                 "no `;` stands between `}` and `else`"
             } else {
