@@ -134,6 +134,18 @@ impl Builder {
         nested.map(|e| Body { stmts: Vec::new(), span: e.span, result: Some(Box::new(e)) })
     }
 
+    /// `target ~ dist`, where the target has to be a name, or one with keys.
+    pub fn draw(&mut self, target: Deep<Expr>, dist: Deep<Expr>, tags: Vec<Deep<Tag>>) -> Deep<StmtKind> {
+        let mut name = &target.node;
+        while let ExprKind::Index { base, .. } = &name.kind {
+            name = base;
+        }
+        if !matches!(name.kind, ExprKind::Var(_) | ExprKind::Error) {
+            self.errors.push(SyntaxError::new(SyntaxErrorKind::DrawTarget, target.node.span));
+        }
+        target.and(dist).and(all(tags)).map(|((target, dist), tags)| StmtKind::Draw { target, dist, tags })
+    }
+
     pub fn stmt(&self, start: usize, kind: Deep<StmtKind>, end: usize) -> BodyStmt {
         let span = self.span(start, end);
         BodyStmt { stmt: kind.map(|kind| Stmt { kind, span }), open_if: false }

@@ -4,7 +4,7 @@
 //! by hopping over brackets, and one forgotten bracket is one error, not a parse error at the end of the file. If the
 //! brackets match, nothing is changed; only if they do not, indentation and keywords are asked where one is missing.
 
-use super::error::{SyntaxError, SyntaxErrorKind};
+use super::error::{MAX_ERRORS, SyntaxError, SyntaxErrorKind};
 use super::lexer::Lexeme;
 use super::span::{FileId, Span};
 use super::token::Token;
@@ -123,6 +123,10 @@ impl<'s> Balancer<'_, 's> {
             } else {
                 self.push(lexeme.clone());
             }
+            if self.errors.len() > MAX_ERRORS {
+                // What is made of the rest is not looked at.
+                break;
+            }
         }
         self.close_from(0, None);
     }
@@ -160,7 +164,11 @@ impl<'s> Balancer<'_, 's> {
             let inner = brace.is_some_and(|b| indent.is_some_and(|indent| indent < self.open[b].indent));
             brace.map(|b| self.open.iter().rposition(aligned).filter(|_| inner).unwrap_or(b))
         } else {
-            let same = self.open[parentheses..].iter().rposition(|open| open.close == close).map(|p| parentheses + p);
+            // A brace on the same line may be forgotten, one that spans lines is not closed by this.
+            let line = self.text[..lexeme.start].rfind('\n').map_or(0, |i| i + 1);
+            let passed = |open: &&Open| open.close != '}' || self.output[open.index].start >= line;
+            let reach = self.open.len() - self.open.iter().rev().take_while(passed).count();
+            let same = self.open[reach..].iter().rposition(|open| open.close == close).map(|p| reach + p);
             // The wrong one of `)` and `]` is exchanged.
             same.or((self.open.len() > parentheses).then(|| self.open.len() - 1))
         };

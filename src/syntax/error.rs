@@ -9,7 +9,7 @@ use super::span::Span;
 use super::token::Foreign;
 use crate::diag::{Diagnostic, IntoDiagnostic, too_large};
 
-/// At most this many errors are reported for a text.
+/// At most this many errors are reported for a text, and then that there are more.
 pub const MAX_ERRORS: usize = 20;
 
 /// An error in a text, and where.
@@ -67,8 +67,10 @@ pub enum SyntaxErrorKind {
     },
     /// A token that does not fit the grammar.
     Unexpected {
-        /// What was found, in words; `None` for the end of the text.
-        found: Option<String>,
+        /// What was found, in words.
+        found: String,
+        /// Whether that is the end of the text.
+        at_end: bool,
         /// What was expected, in words.
         expected: String,
         /// What was probably meant.
@@ -77,6 +79,8 @@ pub enum SyntaxErrorKind {
     },
     /// An `if` without `else` whose branch has a value.
     ValueWithoutElse,
+    /// A `~` after something that is no name.
+    DrawTarget,
     /// Further errors are not reported.
     TooManyErrors,
 }
@@ -108,7 +112,7 @@ impl SyntaxError {
             SyntaxErrorKind::UnterminatedComment
                 | SyntaxErrorKind::Unclosed { before: None, .. }
                 | SyntaxErrorKind::MissingSemicolon { at_end: true }
-                | SyntaxErrorKind::Unexpected { found: None, .. }
+                | SyntaxErrorKind::Unexpected { at_end: true, .. }
         )
     }
 }
@@ -152,10 +156,12 @@ impl IntoDiagnostic for SyntaxError {
                 .note(format!("at most {MAX_TOKENS} words, numbers and symbols are accepted in a file")),
             TooLarge(bytes) => too_large(bytes, span),
             MissingSemicolon { .. } => error("expected `;` at the end of this statement", "add `;` here"),
-            Unexpected { found, expected, advice } => unexpected(found, &expected, advice, span),
+            Unexpected { found, expected, advice, .. } => unexpected(&found, &expected, advice, span),
             ValueWithoutElse => error("this value is lost when the condition is false", "the `if` has no `else`")
                 .hint("add `else { … }`, or end the expression with `;`"),
-            TooManyErrors => error("too many errors", "the text from here on was not checked"),
+            DrawTarget => error("only a name can be drawn", "this is no name")
+                .hint("write `x ~ d;` or, with a key, `x[k] ~ d;`; what is known is observed: `observe d = v;`"),
+            TooManyErrors => error("too many errors", "from here on they are not shown"),
         }
     }
 }
@@ -214,7 +220,9 @@ fn foreign_spelling(foreign: Foreign, found: &str, span: Span) -> Diagnostic {
         Foreign::EqEqEq => error("write `==`"),
         Foreign::NotEqEq => error("write `!=`"),
         Foreign::Caret => error("write `**`").hint("a power is written `x ** 2`"),
-        Foreign::Bar => error("").hint("write `or` between conditions; a function is called as `f(x)`, not `x |> f`"),
+        Foreign::Bar => {
+            error("").hint("write `or` between conditions, `fn(x) { … }` for a function, `f(x)` for its call")
+        }
         Foreign::Update => error("").hint(
             "values do not change; bind a new name, `let y = x + 1;`, or add to the log density, `factor(logw);`",
         ),
@@ -263,15 +271,21 @@ fn address(problem: AddressError, span: Span) -> Diagnostic {
 
 fn unclosed(open: char, before: Option<(String, Span)>, span: Span) -> Diagnostic {
     let error = Diagnostic::error(format!("this `{open}` is not closed"), span, "opened here");
+    let close = match open {
+        '(' => ')',
+        '[' => ']',
+        _ => '}',
+    };
     match before {
-        Some((found, place)) => error.secondary(place, format!("still open at {found}")),
-        None => error,
+        Some((found, place)) => error
+            .secondary(place, format!("still open at {found}"))
+            .hint(format!("add `{close}` somewhere before this {found}")),
+        None => error.hint(format!("add `{close}` where it ends")),
     }
 }
 
-fn unexpected(found: Option<String>, expected: &str, advice: Option<Advice>, span: Span) -> Diagnostic {
-    let found = found.unwrap_or_else(|| "end of the file".to_owned());
-    let Advice { message, label, hint } = advice.unwrap_or_default();
+fn unexpected(found: &str, expected: &str, advice: Option<Advice>, span: Span) -> Diagnostic {
+    let Advice { message, label, hint, .. } = advice.unwrap_or_default();
     let message = message.unwrap_or_else(|| format!("unexpected {found}"));
     let error = Diagnostic::error(message, span, label.unwrap_or_else(|| format!("expected {expected}")));
     hint.into_iter().fold(error, Diagnostic::hint)

@@ -3,40 +3,41 @@
 use std::collections::BTreeSet;
 
 /// Tokens that begin expressions (and some that also begin something else).
+#[rustfmt::skip]
 const EXPRESSION: [&str; 17] = [
-    "a name",
-    "a number",
-    "a string",
-    "an address",
-    "a tag selection",
-    "true",
-    "false",
-    "not",
-    "-",
-    "(",
-    "[",
-    "{",
-    "if",
-    "fn",
-    "to",
-    "when",
-    "coarse",
+    "a name", "a number", "a string", "an address", "a tag selection", "true", "false", "not", "-", "(", "[", "{", "if", "fn",
+    "to", "when", "coarse",
 ];
 /// Tokens that go on with an expression.
-const OPERATOR: [&str; 20] =
-    ["or", "and", "==", "!=", "<", "<=", ">", ">=", "..", "+", "-", "*", "/", "%", "&", "**", "(", "[", ".", "~"];
+const OPERATOR: [&str; 16] = ["or", "and", "==", "!=", "<", "<=", ">", ">=", "..", "+", "-", "*", "/", "%", "&", "**"];
+/// Tokens that go on with a name or call.
+const SUFFIX: [&str; 3] = ["(", "[", "."];
 
 /// The names of tokens as the parser lists them, without their quotes.
 pub(super) fn names(expected: &[String]) -> BTreeSet<&str> {
     expected.iter().map(|e| e.trim_matches('"')).filter(|e| *e != "a bad statement").collect()
 }
 
+/// Whether a statement could begin. (Where any word could be a field's name, the keywords of statements are expected too.)
+pub(super) fn is_statement(names: &BTreeSet<&str>) -> bool {
+    names.contains("let") && names.contains("for") && !names.contains("in")
+}
+
+/// Whether an expression could begin.
+pub(super) fn is_expression(names: &BTreeSet<&str>) -> bool {
+    names.contains("a number") && names.contains("(")
+}
+
+/// Whether an expression could go on with an operator.
+pub(super) fn is_operator(names: &BTreeSet<&str>) -> bool {
+    !is_expression(names) && !names.contains("in") && OPERATOR.iter().any(|op| names.contains(op))
+}
+
 /// A list in words: "`,`, `)` or an operator".
 pub(super) fn describe(expected: &[String]) -> String {
     let mut names = names(expected);
     let mut words: Vec<String> = Vec::new();
-    let statement = names.contains("let") && names.contains("for");
-    if statement {
+    if is_statement(&names) {
         words.push(if names.contains("include") { "a statement or declaration" } else { "a statement" }.to_owned());
         let close = names.contains("}");
         names.clear();
@@ -44,7 +45,7 @@ pub(super) fn describe(expected: &[String]) -> String {
             names.insert("}");
         }
     }
-    if names.contains("a number") && names.contains("(") {
+    if is_expression(&names) {
         words.push("an expression".to_owned());
         names.retain(|name| !EXPRESSION.contains(name));
     }
@@ -52,11 +53,9 @@ pub(super) fn describe(expected: &[String]) -> String {
         // Words that may also be names.
         names.retain(|name| !name.starts_with(|c: char| c.is_ascii_lowercase()) || name.contains(' '));
     }
-    let operator = names.contains("**") || names.contains("*") || names.contains("and");
+    let operator = is_operator(&names);
     if operator {
-        // `~` goes on with an expression only at the start of a statement, where it is the likelier one.
-        let draw = names.contains("~");
-        names.retain(|name| !OPERATOR.contains(name) || (*name == "~" && draw));
+        names.retain(|name| !OPERATOR.contains(name) && !SUFFIX.contains(name));
     }
     let quoted = |name: &&str| if name.contains(' ') { (*name).to_owned() } else { format!("`{name}`") };
     // What ends something is what is most often missing.
@@ -86,9 +85,9 @@ mod tests {
         assert_eq!(of(&[";"]), "`;`");
         assert_eq!(of(&[",", ")"]), "`)` or `,`");
         assert_eq!(of(&EXPRESSION), "an expression");
-        assert_eq!(of(&[&OPERATOR[..], &[";", "a bad statement"]].concat()), "`;`, `~` or an operator");
+        assert_eq!(of(&[&OPERATOR[..], &SUFFIX, &[";", "~", "a bad statement"]].concat()), "`;`, `~` or an operator");
         assert_eq!(of(&["let", "for", "a number", "(", "}"]), "`}` or a statement");
-        assert_eq!(of(&["a name", "to", "when", "{"]), "`{` or a name");
+        assert_eq!(of(&["a name", "to", "when", "{"]), "a name or `{`");
         assert_eq!(of(&[]), "the end of the text");
     }
 }

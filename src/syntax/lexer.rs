@@ -71,7 +71,7 @@ pub(crate) fn lex(text: &str, range: Range<usize>, file: FileId, level: u32) -> 
             lexemes.clear();
             break;
         }
-        if lexer.errors.len() >= MAX_ERRORS {
+        if lexer.errors.len() > MAX_ERRORS {
             // Not a program, or one that needs repair before more is said about it.
             break;
         }
@@ -134,13 +134,22 @@ impl<'s> Lexer<'s> {
             Foreign::Number => Token::Number(0.0),
             Foreign::Name => Token::Name(text),
             Foreign::RightArrow => {
-                self.error(SyntaxErrorKind::Foreign(foreign, text.into()), start, end);
+                self.foreign_error(foreign, text, start, end);
                 return (None, end);
             }
             Foreign::Quote => return self.foreign_string(start, end),
         };
-        self.error(SyntaxErrorKind::Foreign(foreign, text.into()), start, end);
+        self.foreign_error(foreign, text, start, end);
         (Some(meant), end)
+    }
+
+    /// Reports a spelling, once on a line.
+    fn foreign_error(&mut self, foreign: Foreign, text: &str, start: usize, end: usize) {
+        let kind = SyntaxErrorKind::Foreign(foreign, text.into());
+        let said = |e: &SyntaxError| e.kind == kind && !self.text[e.span.start as usize..start].contains('\n');
+        if !self.errors.iter().any(said) {
+            self.error(kind, start, end);
+        }
     }
 
     /// A string in quotes that are none here, if it is closed on the same line.
@@ -150,11 +159,11 @@ impl<'s> Lexer<'s> {
             if quote == "'" { &['\''] } else { &['"', '“', '”', '„', '«', '»', '‘', '’', '`', '\''] };
         let line = self.rest(at).split('\n').next().unwrap_or("");
         if !line.contains(close) {
-            self.error(SyntaxErrorKind::Foreign(Foreign::Quote, quote.into()), start, at);
+            self.foreign_error(Foreign::Quote, quote, start, at);
             return (None, at);
         }
         let (value, end) = self.string(start, at, close);
-        self.error(SyntaxErrorKind::Foreign(Foreign::Quote, quote.into()), start, end);
+        self.foreign_error(Foreign::Quote, quote, start, end);
         (Some(Token::Str(value)), end)
     }
 

@@ -3,7 +3,7 @@
 use super::ast::{Expr, ExprKind, Program};
 use super::build::Builder;
 use super::deep::Deep;
-use super::delimiters::balance;
+use super::delimiters::{Balanced, balance};
 use super::error::{MAX_ERRORS, SyntaxError, SyntaxErrorKind};
 use super::grammar::ExpressionParser;
 use super::lexer::lex;
@@ -17,23 +17,20 @@ use std::ops::Range;
 /// The program holds what could be parsed: where a statement could not, it has an expression statement of
 /// [`ExprKind::Error`]. Without errors it holds no such expression, and its tree is no deeper than
 /// [`MAX_DEPTH`](super::MAX_DEPTH).
-/// The errors, at most a few more than [`MAX_ERRORS`], are in the order of the text.
+/// The errors are in the order of the text; after [`MAX_ERRORS`] of them comes [`SyntaxErrorKind::TooManyErrors`].
 pub fn parse(text: &str, file: FileId) -> (Program, Vec<SyntaxError>) {
     if text.len() > MAX_SOURCE_BYTES {
         let error = SyntaxError::new(SyntaxErrorKind::TooLarge(text.len()), Span::new(file, 0, 0));
         return (Program::default(), vec![error]);
     }
     let (lexemes, mut errors) = lex(text, 0..text.len(), file, 0);
-    if errors.len() >= MAX_ERRORS {
-        let end = errors.last().map_or(0, |e| e.span.end as usize);
-        errors.push(SyntaxError::new(SyntaxErrorKind::TooManyErrors, Span::new(file, end, end)));
-        return (Program::default(), errors);
-    }
     let mut balanced = balance(text, file, lexemes);
-    errors.append(&mut balanced.errors);
-    let program = parse_program(Tokens::new(text, file, balanced), &mut errors);
-    errors.sort_by_key(|e| (e.span.start, e.span.end));
-    (program, errors)
+    add_brackets(&mut errors, &mut balanced);
+    let mut program = Program::default();
+    if errors.len() <= MAX_ERRORS {
+        program = parse_program(Tokens::new(text, file, "end of the file", balanced), &mut errors);
+    }
+    (program, finish(errors))
 }
 
 /// Parses one expression: a value given to `--set`, a line of the REPL.
@@ -57,19 +54,56 @@ pub(crate) fn parse_range(text: &str, range: Range<usize>, file: FileId, level: 
     let text = &text[..range.end];
     let (lexemes, mut errors) = lex(text, range, file, level);
     let mut balanced = balance(text, file, lexemes);
-    errors.append(&mut balanced.errors);
-    let tokens = Tokens::new(text, file, balanced);
+    add_brackets(&mut errors, &mut balanced);
+    let tokens = Tokens::new(text, file, if level == 0 { "end of the text" } else { "end of the key" }, balanced);
     let mut builder = Builder::new(file);
     let expr = match ExpressionParser::new().parse(&mut builder, tokens.iter()) {
         Ok(expr) => expr,
         Err(error) => {
             if errors.is_empty() {
-                errors.push(tokens.explain(&error, 0));
+                errors.push(tokens.explain(&error));
             }
             hole
         }
     };
     errors.append(&mut builder.errors);
+    (expr, finish(errors))
+}
+
+/// The errors in the order of the text, and no more than are useful.
+fn finish(mut errors: Vec<SyntaxError>) -> Vec<SyntaxError> {
     errors.sort_by_key(|e| (e.span.start, e.span.end));
-    (expr, errors)
+    // A `}` that nothing opened follows from a `{` that was expected before.
+    let mut missing = 0_usize;
+    errors.retain(|e| match &e.kind {
+        SyntaxErrorKind::Unexpected { expected, .. } if expected.contains("`{`") => {
+            missing += 1;
+            true
+        }
+        SyntaxErrorKind::StrayClose('}') if missing > 0 => {
+            missing -= 1;
+            false
+        }
+        _ => true,
+    });
+    if let Some(next) = errors.get(MAX_ERRORS) {
+        let span = next.span;
+        errors.truncate(MAX_ERRORS);
+        errors.push(SyntaxError::new(SyntaxErrorKind::TooManyErrors, span));
+    }
+    errors
+}
+
+/// Adds the errors about brackets, but for those that a lexeme without an end may have swallowed.
+fn add_brackets(errors: &mut Vec<SyntaxError>, balanced: &mut Balanced<'_>) {
+    use SyntaxErrorKind::{Address, UnterminatedComment, UnterminatedString};
+    let swallows = |e: &&SyntaxError| matches!(e.kind, UnterminatedString | UnterminatedComment | Address(_));
+    let swallowed: Vec<u32> = errors.iter().filter(swallows).map(|e| e.span.start).collect();
+    errors.extend(balanced.errors.drain(..).filter(|e| match &e.kind {
+        SyntaxErrorKind::Unclosed { before, .. } => {
+            let end = before.as_ref().map_or(u32::MAX, |(_, place)| place.start);
+            !swallowed.iter().any(|start| (e.span.start..end).contains(start))
+        }
+        _ => true,
+    }));
 }

@@ -395,7 +395,6 @@ impl Printer {
                 self.text(")");
             }
             ExprKind::Index { base, index } => {
-                // Right after an address or a bare number, `[` and `.` would belong to that token.
                 self.base(base);
                 self.text("[");
                 self.expr(index);
@@ -428,9 +427,10 @@ impl Printer {
         }
     }
 
+    /// What is indexed: right after an address, `[` and `.` would belong to it.
     fn base(&mut self, base: &Expr) {
-        let token = matches!(base.kind, ExprKind::Address(_) | ExprKind::Num(_) | ExprKind::TagSel { .. });
-        self.operand(base, if token { POSTFIX + 1 } else { POSTFIX });
+        let address = matches!(base.kind, ExprKind::Address(_));
+        self.operand(base, if address { POSTFIX + 1 } else { POSTFIX });
     }
 
     /// An `if`, without its last `else` if `open`.

@@ -10,6 +10,7 @@ use super::ast::Program;
 use super::build::Builder;
 use super::delimiters::{Balanced, first_on_line, starts_statement};
 use super::error::{MAX_ERRORS, SyntaxError, SyntaxErrorKind};
+use super::expected::{is_statement, names};
 use super::grammar::ProgramParser;
 use super::lexer::Lexeme;
 use super::span::{FileId, Span};
@@ -22,6 +23,8 @@ use std::ops::Range;
 pub(crate) struct Tokens<'s> {
     pub text: &'s str,
     pub file: FileId,
+    /// What the user calls the end of this text.
+    pub end_name: &'static str,
     pub lexemes: Vec<Lexeme<'s>>,
     mates: Vec<usize>,
     /// Whether a `;` is added before the token; also for the end of the text.
@@ -36,18 +39,10 @@ pub(crate) struct Tokens<'s> {
 pub(crate) type Triple<'s> = (usize, Token<'s>, usize);
 
 impl<'s> Tokens<'s> {
-    pub fn new(text: &'s str, file: FileId, balanced: Balanced<'s>) -> Self {
+    pub fn new(text: &'s str, file: FileId, end_name: &'static str, balanced: Balanced<'s>) -> Self {
         let Balanced { lexemes, mates, .. } = balanced;
-        let n = lexemes.len();
-        Tokens {
-            text,
-            file,
-            lexemes,
-            mates,
-            semicolon: vec![false; n + 1],
-            dropped: vec![false; n],
-            last: Cell::new(0),
-        }
+        let (semicolon, dropped) = (vec![false; lexemes.len() + 1], vec![false; lexemes.len()]);
+        Tokens { text, file, end_name, lexemes, mates, semicolon, dropped, last: Cell::new(0) }
     }
 
     /// The tokens as repaired.
@@ -61,32 +56,33 @@ impl<'s> Tokens<'s> {
         })
     }
 
-    /// Turns an error of the parser into one for the user.
-    pub fn explain(&self, error: &ParseError<usize, Token<'s>, ()>, start: usize) -> SyntaxError {
-        let at = self.error_index(error);
-        let kind = match error {
-            ParseError::UnrecognizedEof { expected, .. } | ParseError::UnrecognizedToken { expected, .. } => {
-                advice::explain(&Context { tokens: self, at, start, expected })
-            }
-            // The grammar's own errors and extra tokens do not occur.
-            _ => advice::explain(&Context { tokens: self, at, start, expected: &[] }),
-        };
-        SyntaxError::new(kind, self.span_at(at))
-    }
-
-    /// The index of the token that did not fit; the number of tokens at the end of the text.
-    fn error_index(&self, error: &ParseError<usize, Token<'s>, ()>) -> usize {
+    /// The index of the token that did not fit (the number of tokens at the end of the text), and what would have.
+    fn misfit<'e>(&self, error: &'e ParseError<usize, Token<'s>, ()>) -> (usize, &'e [String]) {
         match error {
-            ParseError::UnrecognizedEof { .. } => self.lexemes.len(),
-            _ => self.last.get(),
+            ParseError::UnrecognizedEof { expected, .. } => (self.lexemes.len(), expected),
+            ParseError::UnrecognizedToken { expected, .. } => (self.last.get(), expected),
+            // Errors of the grammar's own, of a built-in lexer, and extra tokens do not occur.
+            _ => (self.last.get(), &[]),
         }
     }
 
+    /// Turns an error of the parser, in a text that is no list of statements, into one for the user.
+    pub fn explain(&self, error: &ParseError<usize, Token<'s>, ()>) -> SyntaxError {
+        let (at, expected) = self.misfit(error);
+        advice::explain(&Context { tokens: self, at, start: 0, expected, semicolon: false })
+    }
+
     /// The place of a token, or of the end of the text.
-    fn span_at(&self, at: usize) -> Span {
-        let end = self.text.trim_end().len();
+    pub fn span_at(&self, at: usize) -> Span {
+        let end = self.text.trim_end().len().max(self.lexemes.last().map_or(0, |l| l.end));
         let (start, end) = self.lexemes.get(at).map_or((end, end), |l| (l.start, l.end));
         Span::new(self.file, start, end)
+    }
+
+    /// The place right after the token before token `at`.
+    pub fn span_after(&self, at: usize) -> Span {
+        let end = at.checked_sub(1).and_then(|i| self.lexemes.get(i)).map_or(0, |l| l.end);
+        Span::new(self.file, end, end)
     }
 
     fn token(&self, i: usize) -> Option<&Token<'s>> {
@@ -106,11 +102,12 @@ impl<'s> Tokens<'s> {
         }
     }
 
-    /// The statement to give up for an error at token `at`: the innermost that has any tokens.
-    fn statement(&self, at: usize) -> Option<Range<usize>> {
+    /// The statement to give up for an error at token `at`: the innermost that has any tokens. If a statement was to
+    /// begin there (`fresh`), nothing before it belongs to it.
+    fn statement(&self, at: usize, fresh: bool) -> Option<Range<usize>> {
         let (mut block, mut found) = (0..self.lexemes.len(), None);
         loop {
-            let statement = self.statement_in(&block, at);
+            let statement = self.statement_in(&block, at, fresh);
             if !statement.is_empty() && self.token(statement.start) != Some(&Token::Bad) {
                 found = Some(statement.clone());
             }
@@ -120,9 +117,12 @@ impl<'s> Tokens<'s> {
     }
 
     /// The statement of a block that token `at` belongs to.
-    fn statement_in(&self, block: &Range<usize>, at: usize) -> Range<usize> {
+    fn statement_in(&self, block: &Range<usize>, at: usize, fresh: bool) -> Range<usize> {
         let (mut start, mut i) = (block.start, block.start);
         while i < block.end {
+            if fresh && i == at {
+                start = at;
+            }
             let next = self.live(self.mates[i].max(i) + 1).min(block.end);
             let ended = match self.lexemes[i].token {
                 Token::Semi | Token::Bad => true,
@@ -132,7 +132,7 @@ impl<'s> Tokens<'s> {
             let begins = starts_statement(&self.lexemes, next) && first_on_line(self.text, &self.lexemes, next);
             if ended || begins || self.semicolon[next] {
                 // A statement that broke off before a keyword owns the error at the keyword.
-                if next > at || (next == at && !ended) {
+                if next > at || (next == at && !ended && !fresh) {
                     return start..next;
                 }
                 start = next;
@@ -178,10 +178,22 @@ impl<'s> Tokens<'s> {
         })
     }
 
-    fn drop_statement(&mut self, range: Range<usize>) {
-        if let Some(first) = self.lexemes.get_mut(range.start) {
-            first.token = Token::Bad;
+    /// Adds what the actions found, but for what lies in an item with an error: it may only follow from that.
+    fn add_new(&self, found: Vec<SyntaxError>, errors: &mut Vec<SyntaxError>) {
+        let known: Vec<u32> = errors.iter().map(|e| e.span.start).collect();
+        for error in found {
+            let at = self.lexemes.partition_point(|l| l.start < error.span.start as usize);
+            let item = self.statement_in(&(0..self.lexemes.len()), at, false);
+            let bytes = self.span_at(item.start).start..self.span_at(item.end.saturating_sub(1)).end;
+            if !known.iter().any(|start| bytes.contains(start)) {
+                errors.push(error);
+            }
         }
+    }
+
+    fn drop_statement(&mut self, range: Range<usize>) {
+        self.lexemes[range.start].token = Token::Bad;
+        self.lexemes[range.start].end = self.lexemes[range.end - 1].end;
         self.dropped[range.start + 1..range.end].fill(true);
     }
 }
@@ -193,41 +205,29 @@ pub(crate) fn parse_program(mut tokens: Tokens<'_>, errors: &mut Vec<SyntaxError
         let mut builder = Builder::new(tokens.file);
         let error = match ProgramParser::new().parse(&mut builder, tokens.iter()) {
             Ok(program) => {
-                errors.extend(builder.errors);
+                tokens.add_new(builder.errors, errors);
                 return program;
             }
             Err(error) => error,
         };
-        let at = tokens.error_index(&error);
-        if errors.len() >= MAX_ERRORS {
-            errors.push(SyntaxError::new(SyntaxErrorKind::TooManyErrors, tokens.span_at(at)));
-            return Program::default();
-        }
-        let statement = tokens.statement(at);
+        let (at, expected) = tokens.misfit(&error);
+        let statement = tokens.statement(at, is_statement(&names(expected)));
         let start = statement.as_ref().map_or(at, |s| s.start);
-        let first_byte = tokens.lexemes.get(start).map_or(0, |l| l.start) as u32;
-        let here = tokens.span_at(at);
-        let known = earlier.iter().any(|e| (first_byte..=here.end).contains(&e.start));
-        let missing = matches!(&error, ParseError::UnrecognizedEof { expected, .. }
-            | ParseError::UnrecognizedToken { expected, .. } if tokens.lacks_semicolon(at, expected));
-        let explained = tokens.explain(&error, start);
-        if missing && matches!(&explained.kind, SyntaxErrorKind::Unexpected { advice: None, .. }) {
-            let end = tokens.lexemes[at - 1].end;
-            if !known {
-                let kind = SyntaxErrorKind::MissingSemicolon { at_end: at == tokens.lexemes.len() };
-                errors.push(SyntaxError::new(kind, Span::new(tokens.file, end, end)));
-            }
-            tokens.semicolon[at] = true;
-            continue;
-        }
-        let cascade = tokens.lexemes.get(at).is_some_and(|l| l.token == Token::Bad);
-        if !known && !cascade {
+        let semicolon = tokens.lacks_semicolon(at, expected);
+        let explained = advice::explain(&Context { tokens: &tokens, at, start, expected, semicolon });
+        let add_semicolon = matches!(explained.kind, SyntaxErrorKind::MissingSemicolon { .. });
+        let known = earlier.iter().any(|e| (tokens.span_at(start).start..=tokens.span_at(at).end).contains(&e.start));
+        if !known && tokens.token(at) != Some(&Token::Bad) {
             errors.push(explained);
         }
         match statement {
+            _ if add_semicolon => tokens.semicolon[at] = true,
             Some(range) => tokens.drop_statement(range),
             // Nothing is left to give up.
             None => return Program::default(),
+        }
+        if errors.len() > MAX_ERRORS {
+            return Program::default();
         }
     }
 }
