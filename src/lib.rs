@@ -5,6 +5,11 @@
 pub mod diag;
 pub mod dist;
 pub mod geom;
+pub mod infer {
+    //! Draws and diagnostics.
+    pub mod diagnostics;
+    pub mod draws;
+}
 pub mod num;
 pub mod render;
 pub mod rng;
