@@ -13,5 +13,5 @@ pub mod infer {
 pub mod num;
 pub mod render;
 pub mod rng;
-pub mod syntax;
+//pub mod syntax;
 pub mod vision;
