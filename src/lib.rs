@@ -9,6 +9,7 @@ pub mod infer;
 pub mod lang;
 pub mod num;
 pub mod render;
+pub mod report;
 pub mod rng;
 pub mod syntax;
 pub mod trace;

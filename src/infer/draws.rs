@@ -1,8 +1,153 @@
-//! stub
-#![allow(missing_docs)]
+//! What inference hands out: draws, one row at a time, and what the kernels did.
+//!
+//! Plain data and the [`Sink`] they flow into; where draws go (a file, memory, a progress line) is the sink's business.
+//! Invariant: the values of every row have the length [`width`] of the columns announced before the first row.
+
+use serde::{Deserialize, Serialize};
 use std::io;
-#[derive(Debug,Clone)] pub enum Shape { Scalar, Vector(usize) }
-#[derive(Debug,Clone)] pub struct Column { pub name: String, pub shape: Shape }
-pub struct DrawRow { pub chain: u32, pub draw: u64, pub step: u64, pub log_joint: f64, pub log_prior: f64, pub log_likelihood: f64, pub values: Vec<f64> }
-pub trait Sink: Send { fn columns(&mut self, columns: &[Column]) -> io::Result<()>; fn draw(&mut self, row: &DrawRow) -> io::Result<()>; fn chain_done(&mut self, chain: u32, steps: u64, warmup: u64, seconds: f64) -> io::Result<()>; }
-#[derive(Debug,Clone,Default)] pub struct KernelStats { pub name: String, pub proposals: u64, pub accepted: u64, pub seconds: f64, pub failed: u64 }
+
+/// How many numbers a column holds in each draw.
+#[derive(Clone, Copy, Debug, PartialEq, Eq, Serialize, Deserialize)]
+pub enum Shape {
+    /// One.
+    Scalar,
+    /// A fixed number of them, maybe none.
+    Vector(usize),
+}
+
+impl Shape {
+    /// The count of numbers.
+    pub fn len(self) -> usize {
+        match self {
+            Shape::Scalar => 1,
+            Shape::Vector(n) => n,
+        }
+    }
+
+    /// Whether it holds nothing.
+    pub fn is_empty(self) -> bool {
+        self.len() == 0
+    }
+}
+
+/// A recorded quantity.
+#[derive(Clone, Debug, PartialEq, Eq, Serialize, Deserialize)]
+pub struct Column {
+    /// Its name; parts of an address are separated by `/`.
+    pub name: String,
+    /// Its shape.
+    pub shape: Shape,
+}
+
+impl Column {
+    /// A column of one number.
+    pub fn scalar(name: impl Into<String>) -> Self {
+        Column { name: name.into(), shape: Shape::Scalar }
+    }
+
+    /// A column of `n` numbers.
+    pub fn vector(name: impl Into<String>, n: usize) -> Self {
+        Column { name: name.into(), shape: Shape::Vector(n) }
+    }
+}
+
+/// The count of numbers in a row.
+pub fn width(columns: &[Column]) -> usize {
+    columns.iter().map(|c| c.shape.len()).sum()
+}
+
+/// One recorded draw.
+#[derive(Clone, Debug, PartialEq)]
+pub struct DrawRow {
+    /// The chain, from 0.
+    pub chain: u32,
+    /// The draw within the chain, from 0.
+    pub draw: u64,
+    /// Kernel applications before it, warm-up included.
+    pub step: u64,
+    /// Natural log of the joint density, up to a constant if the likelihood is.
+    pub log_joint: f64,
+    /// The part of it from the random choices.
+    pub log_prior: f64,
+    /// The part of it from the observations.
+    pub log_likelihood: f64,
+    /// The columns, flattened.
+    pub values: Vec<f64>,
+}
+
+/// Where the draws of one chain go.
+pub trait Sink: Send {
+    /// Announces the columns, once, before the first draw.
+    ///
+    /// # Errors
+    /// If they cannot be written.
+    fn columns(&mut self, columns: &[Column]) -> io::Result<()>;
+
+    /// Takes a draw.
+    ///
+    /// # Errors
+    /// If it cannot be written.
+    fn draw(&mut self, row: &DrawRow) -> io::Result<()>;
+
+    /// The chain has ended after `steps` kernel applications and `warmup` before them, in `seconds` of wall time.
+    ///
+    /// # Errors
+    /// If that cannot be written.
+    fn chain_done(&mut self, chain: u32, steps: u64, warmup: u64, seconds: f64) -> io::Result<()>;
+}
+
+/// What a kernel did in a chain, or in all of them.
+#[derive(Clone, Debug, Default, PartialEq, Serialize, Deserialize)]
+pub struct KernelStats {
+    /// The kernel as the program writes it.
+    pub name: String,
+    /// Proposals made.
+    pub proposals: u64,
+    /// Those accepted.
+    pub accepted: u64,
+    /// Wall time in it, in seconds.
+    pub seconds: f64,
+    /// Those rejected because the program has no value there (a domain error).
+    pub failed: u64,
+}
+
+impl KernelStats {
+    /// Accepted proposals per proposal; `None` if there was none.
+    pub fn acceptance(&self) -> Option<f64> {
+        (self.proposals > 0).then(|| self.accepted as f64 / self.proposals as f64)
+    }
+
+    /// The kernels of several chains, added up by name, in order of first appearance.
+    pub fn total<'a>(stats: impl IntoIterator<Item = &'a KernelStats>) -> Vec<KernelStats> {
+        let mut sum: indexmap::IndexMap<&str, KernelStats> = indexmap::IndexMap::new();
+        for s in stats {
+            let t = sum.entry(&s.name).or_insert_with(|| KernelStats { name: s.name.clone(), ..Default::default() });
+            t.proposals += s.proposals;
+            t.accepted += s.accepted;
+            t.seconds += s.seconds;
+            t.failed += s.failed;
+        }
+        sum.into_values().collect()
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    #[test]
+    fn kernels_of_the_same_name_add_up_in_order() {
+        let k = |name: &str, proposals, accepted| KernelStats {
+            name: name.into(),
+            proposals,
+            accepted,
+            seconds: 0.5,
+            failed: 1,
+        };
+        let total = KernelStats::total(&[k("mh", 4, 1), k("drift", 2, 2), k("mh", 6, 4)]);
+        assert_eq!(total.iter().map(|t| &*t.name).collect::<Vec<_>>(), ["mh", "drift"]);
+        assert_eq!((total[0].proposals, total[0].accepted, total[0].failed, total[0].seconds), (10, 5, 2, 1.0));
+        assert_eq!(total[0].acceptance(), Some(0.5));
+        assert_eq!(KernelStats::default().acceptance(), None);
+    }
+}

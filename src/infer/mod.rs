@@ -2,6 +2,7 @@
 
 mod chains;
 mod default_plan;
+pub mod diagnostics;
 pub mod draws;
 mod expr;
 mod force;

@@ -1,0 +1,88 @@
+//! A rectangle of draws, chain after chain, and the moments the diagnostics need.
+
+/// Draws of several chains of one length.
+#[derive(Clone, Debug, PartialEq)]
+pub(super) struct Chains {
+    values: Vec<f64>,
+    draws: usize,
+}
+
+impl Chains {
+    /// Copies the draws; `None` if there are fewer than four in a chain, or one is not finite.
+    pub fn new<C: AsRef<[f64]>>(chains: &[C]) -> Option<Chains> {
+        let draws = chains.iter().map(|c| c.as_ref().len()).min()?;
+        let values: Vec<f64> = chains.iter().flat_map(|c| c.as_ref().iter().take(draws)).copied().collect();
+        (draws >= 4 && values.iter().all(|x| x.is_finite())).then_some(Chains { values, draws })
+    }
+
+    /// The number of chains.
+    pub fn count(&self) -> usize {
+        self.values.len() / self.draws
+    }
+
+    /// The number of draws in each.
+    pub fn draws(&self) -> usize {
+        self.draws
+    }
+
+    /// Every draw.
+    pub fn values(&self) -> &[f64] {
+        &self.values
+    }
+
+    /// Chain by chain.
+    pub fn iter(&self) -> impl Iterator<Item = &[f64]> {
+        self.values.chunks_exact(self.draws)
+    }
+
+    /// The first and the last half of each chain as chains of their own; the middle draw of an odd number is left out.
+    pub fn split(&self) -> Chains {
+        let half = self.draws / 2;
+        let mut values = Vec::with_capacity(2 * half * self.count());
+        values.extend(self.iter().flat_map(|c| &c[..half]));
+        values.extend(self.iter().flat_map(|c| &c[c.len() - half..]));
+        Chains { values, draws: half }
+    }
+
+    /// The same chains with every draw replaced.
+    pub fn map(&self, f: impl Fn(f64) -> f64) -> Chains {
+        self.with_values(self.values.iter().map(|&x| f(x)).collect())
+    }
+
+    /// The same shape with other values.
+    pub fn with_values(&self, values: Vec<f64>) -> Chains {
+        debug_assert_eq!(values.len(), self.values.len());
+        Chains { values, draws: self.draws }
+    }
+}
+
+/// The mean; NaN of nothing.
+pub(super) fn mean(x: &[f64]) -> f64 {
+    x.iter().sum::<f64>() / x.len() as f64
+}
+
+/// The unbiased variance, over n - 1; NaN of fewer than two.
+pub(super) fn variance(x: &[f64]) -> f64 {
+    let m = mean(x);
+    x.iter().map(|v| (v - m) * (v - m)).sum::<f64>() / (x.len() as f64 - 1.0)
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    #[test]
+    fn split_leaves_out_the_middle_draw() {
+        let c = Chains::new(&[vec![1., 2., 3., 4., 5.], vec![6., 7., 8., 9., 10.]]).unwrap();
+        let s = c.split();
+        assert_eq!(s.iter().collect::<Vec<_>>(), [&[1., 2.][..], &[6., 7.], &[4., 5.], &[9., 10.]]);
+    }
+
+    #[test]
+    fn ragged_chains_are_cut_and_bad_ones_refused() {
+        assert_eq!(Chains::new(&[vec![0.; 9], vec![0.; 6]]).unwrap().draws(), 6);
+        assert_eq!(Chains::new(&[vec![0.; 3]]), None);
+        assert_eq!(Chains::new(&[vec![0., 1., f64::INFINITY, 2.]]), None);
+        assert_eq!(Chains::new::<Vec<f64>>(&[]), None);
+    }
+}

@@ -1,0 +1,50 @@
+//! Sample quantiles.
+
+/// The quantile at `p` in [0, 1] by linear interpolation between order statistics (R's type 7, numpy's default); NaN of
+/// nothing, or if a draw is NaN.
+pub fn quantile(x: &[f64], p: f64) -> f64 {
+    if x.iter().any(|v| v.is_nan()) {
+        return f64::NAN;
+    }
+    let mut sorted = x.to_vec();
+    sorted.sort_by(f64::total_cmp);
+    quantile_sorted(&sorted, p)
+}
+
+/// As [`quantile`], of draws already in ascending order.
+pub fn quantile_sorted(sorted: &[f64], p: f64) -> f64 {
+    let Some(last) = sorted.len().checked_sub(1) else { return f64::NAN };
+    let at = last as f64 * p.clamp(0.0, 1.0);
+    let below = (at as usize).min(last);
+    let (lo, hi) = (sorted[below], sorted[(below + 1).min(last)]);
+    // Between equal values there is nothing to interpolate, and rounding must not lead outside.
+    if lo == hi { lo } else { lo + (at - below as f64) * (hi - lo) }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    #[test]
+    fn interpolates_between_order_statistics() {
+        let x = [4.0, 1.0, 3.0, 2.0];
+        assert_eq!(quantile(&x, 0.0), 1.0);
+        assert_eq!(quantile(&x, 1.0), 4.0);
+        assert_eq!(quantile(&x, 0.5), 2.5);
+        assert_eq!(quantile(&x, 0.25), 1.75);
+        assert_eq!(quantile(&[7.0], 0.3), 7.0);
+    }
+
+    #[test]
+    fn what_cannot_be_said_is_nan() {
+        assert!(quantile(&[], 0.5).is_nan());
+        assert!(quantile(&[1.0, f64::NAN], 0.5).is_nan());
+        assert!(quantile(&[1.0, 2.0], f64::NAN).is_nan());
+    }
+
+    #[test]
+    fn infinite_draws_have_quantiles() {
+        assert_eq!(quantile(&[f64::INFINITY, f64::INFINITY, 0.0], 0.9), f64::INFINITY);
+        assert_eq!(quantile(&[f64::NEG_INFINITY, 0.0, 1.0], 0.75), 0.5);
+    }
+}

@@ -1,0 +1,30 @@
+//! The potential scale reduction factor.
+
+use super::chains::{Chains, mean, variance};
+use super::normal_scores::normal_scores;
+use super::quantile::quantile;
+
+/// Rank-normalised split R-hat: the larger one of bulk and folded R-hat (Vehtari et al. 2021, section 4.1). Near 1 when
+/// the chains agree; above 1.01 they do not yet. NaN for a single chain, or if it cannot be said (see the module).
+pub fn r_hat<C: AsRef<[f64]>>(chains: &[C]) -> f64 {
+    Chains::new(chains).map_or(f64::NAN, |c| rank_normalised(&c))
+}
+
+pub(super) fn rank_normalised(chains: &Chains) -> f64 {
+    if chains.count() < 2 {
+        return f64::NAN;
+    }
+    let median = quantile(chains.values(), 0.5);
+    let bulk = plain(&normal_scores(&chains.split()));
+    let folded = plain(&normal_scores(&chains.map(|x| (x - median).abs()).split()));
+    // Of folded draws that do not vary nothing is said; the bulk's word stands.
+    if folded > bulk { folded } else { bulk }
+}
+
+/// √(marginal variance / within-chain variance) (Gelman & Rubin 1992); NaN of constant chains.
+fn plain(chains: &Chains) -> f64 {
+    let n = chains.draws() as f64;
+    let within = mean(&chains.iter().map(variance).collect::<Vec<_>>());
+    let between = n * variance(&chains.iter().map(mean).collect::<Vec<_>>());
+    ((between / within + n - 1.0) / n).sqrt()
+}

@@ -1,0 +1,3 @@
+//! stub
+#![allow(missing_docs)]
+pub mod address; pub mod builtins; pub mod code; pub mod error; pub mod index; pub mod key; pub mod value;

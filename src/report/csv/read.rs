@@ -1,0 +1,113 @@
+//! Reading a chain's draws back.
+
+use super::DRAW_COLUMNS;
+use super::names::columns;
+use crate::infer::draws::DrawRow;
+use crate::report::ChainDraws;
+use thiserror::Error;
+
+/// What is wrong with a file of draws. Lines are counted from 1.
+#[derive(Clone, Debug, PartialEq, Eq, Error)]
+pub enum CsvError {
+    /// The line of names does not start with the columns about the draw.
+    #[error("line {line}: not a file of draws by pcadlang: its columns do not start with lp__, log_prior__, …")]
+    Columns {
+        /// Where.
+        line: usize,
+    },
+    /// A line has too few or too many numbers.
+    #[error("line {line}: {found} numbers, but {expected} columns")]
+    Width {
+        /// Where.
+        line: usize,
+        /// How many there are.
+        found: usize,
+        /// How many there should be.
+        expected: usize,
+    },
+    /// Something that is not a number.
+    #[error("line {line}: `{text}` is not a number")]
+    Number {
+        /// Where.
+        line: usize,
+        /// What stands there.
+        text: String,
+    },
+}
+
+/// Reads what [`super::CsvSink`] writes, also while it is still being written: a last line that is not finished is left
+/// out.
+///
+/// # Errors
+/// If a finished line is not what it should be.
+pub fn read(text: &str) -> Result<ChainDraws, CsvError> {
+    let mut chain = ChainDraws::default();
+    let mut id = 0;
+    let mut width = None;
+    let finished = text.split_inclusive('\n').filter_map(|l| l.strip_suffix('\n'));
+    for (line, text) in finished.enumerate().map(|(i, l)| (i + 1, l.trim_end_matches('\r'))) {
+        if let Some(comment) = text.strip_prefix('#') {
+            if let Some((key, value)) = comment.split_once('=') {
+                let (key, value) = (key.trim(), value.trim());
+                if key == "id" {
+                    id = value.parse().unwrap_or(1_u32).saturating_sub(1);
+                }
+                chain.comments.push((key.to_owned(), value.to_owned()));
+            }
+        } else if let Some(expected) = width {
+            let row = numbers(text, line, expected)?;
+            chain.rows.push(DrawRow { chain: id, draw: chain.rows.len() as u64, ..row });
+        } else {
+            let names: Vec<&str> = text.split(',').collect();
+            let ours = names.strip_prefix(&DRAW_COLUMNS).ok_or(CsvError::Columns { line })?;
+            chain.columns = columns(ours);
+            width = Some(ours.len());
+        }
+    }
+    Ok(chain)
+}
+
+fn numbers(text: &str, line: usize, expected: usize) -> Result<DrawRow, CsvError> {
+    let parse = |s: &str| s.parse::<f64>().map_err(|_| CsvError::Number { line, text: s.chars().take(40).collect() });
+    let all = text.split(',').map(parse).collect::<Result<Vec<f64>, _>>()?;
+    match &all[..] {
+        [log_joint, log_prior, log_likelihood, step, values @ ..] if values.len() == expected => Ok(DrawRow {
+            chain: 0,
+            draw: 0,
+            step: *step as u64,
+            log_joint: *log_joint,
+            log_prior: *log_prior,
+            log_likelihood: *log_likelihood,
+            values: values.to_vec(),
+        }),
+        _ => Err(CsvError::Width { line, found: all.len(), expected: expected + DRAW_COLUMNS.len() }),
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    const HEAD: &str = "# id = 3\nlp__,log_prior__,log_likelihood__,step__,x,v.1,v.2\n";
+
+    #[test]
+    fn an_unfinished_line_is_left_out() {
+        let whole = format!("{HEAD}-1,-2,1,5,0.5,1,2\n");
+        for cut in 0..whole.len() {
+            let chain = read(&whole[..cut]).unwrap();
+            assert!(chain.rows.is_empty());
+        }
+        let chain = read(&whole).unwrap();
+        assert_eq!((chain.rows[0].chain, chain.rows[0].step, chain.rows[0].values.len()), (2, 5, 3));
+    }
+
+    #[test]
+    fn what_is_wrong_is_said_with_its_line() {
+        assert_eq!(read("a,b\n1,2\n"), Err(CsvError::Columns { line: 1 }));
+        let short = format!("{HEAD}1,2,3\n");
+        assert_eq!(read(&short), Err(CsvError::Width { line: 3, found: 3, expected: 7 }));
+        let word = format!("{HEAD}1,2,3,4,x,6,7\n");
+        assert_eq!(read(&word), Err(CsvError::Number { line: 3, text: "x".into() }));
+        assert_eq!(read("").unwrap(), ChainDraws::default());
+    }
+}

@@ -1,0 +1,80 @@
+//! The draws of a chain in memory, and the scalar quantities they give.
+
+use crate::infer::diagnostics::{Summary, summary};
+use crate::infer::draws::{Column, DrawRow, Shape};
+
+/// The draws of one chain.
+#[derive(Clone, Debug, Default, PartialEq)]
+pub struct ChainDraws {
+    /// Pairs said about the chain (settings, counts), as the file of draws has them.
+    pub comments: Vec<(String, String)>,
+    /// The recorded quantities.
+    pub columns: Vec<Column>,
+    /// The draws, in order.
+    pub rows: Vec<DrawRow>,
+}
+
+/// One number per draw, over all chains.
+#[derive(Clone, Debug)]
+pub struct Quantity {
+    /// Its name: the column's, with `[i]` (from 0, as the language counts) for the element of a vector.
+    pub name: String,
+    /// The column it belongs to; `None` for the log joint density.
+    pub column: Option<usize>,
+    /// The draws, `[chain][draw]`.
+    pub chains: Vec<Vec<f64>>,
+    /// What they say.
+    pub summary: Summary,
+}
+
+/// Every scalar quantity of some chains, the log joint density (`log_joint`) first, with its summary. Columns are those
+/// of the first chain that has any; a chain whose draws lack one has none of it.
+pub fn quantities(chains: &[ChainDraws]) -> Vec<Quantity> {
+    let quantity = |name: String, column, value: &dyn Fn(&DrawRow) -> Option<f64>| {
+        let series: Vec<Vec<f64>> = chains.iter().map(|c| c.rows.iter().filter_map(value).collect()).collect();
+        Quantity { name, column, summary: summary(&series), chains: series }
+    };
+    let mut out = vec![quantity("log_joint".into(), None, &|r| Some(r.log_joint))];
+    let columns = chains.iter().map(|c| &c.columns[..]).find(|c| !c.is_empty()).unwrap_or_default();
+    let mut at = 0;
+    for (index, column) in columns.iter().enumerate() {
+        for i in 0..column.shape.len() {
+            let name = match column.shape {
+                Shape::Scalar => column.name.clone(),
+                Shape::Vector(_) => format!("{}[{i}]", column.name),
+            };
+            out.push(quantity(name, Some(index), &|r| r.values.get(at).copied()));
+            at += 1;
+        }
+    }
+    out
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    #[test]
+    fn vectors_become_elements() {
+        let row = |draw, x: f64| DrawRow {
+            chain: 0,
+            draw,
+            step: draw,
+            log_joint: -x,
+            log_prior: 0.0,
+            log_likelihood: 0.0,
+            values: vec![x, 2.0 * x, 3.0 * x],
+        };
+        let chain = |shift: f64| ChainDraws {
+            columns: vec![Column::scalar("a"), Column::vector("v", 2)],
+            rows: (0..4).map(|d| row(d, d as f64 + shift)).collect(),
+            ..Default::default()
+        };
+        let q = quantities(&[chain(0.0), chain(1.0)]);
+        assert_eq!(q.iter().map(|q| &*q.name).collect::<Vec<_>>(), ["log_joint", "a", "v[0]", "v[1]"]);
+        assert_eq!(q[3].chains, [[0.0, 3.0, 6.0, 9.0], [3.0, 6.0, 9.0, 12.0]]);
+        assert_eq!(q[1].summary.mean, 2.0);
+        assert_eq!((q[0].column, q[3].column), (None, Some(1)));
+        assert_eq!(quantities(&[])[0].chains.len(), 0);
+    }
+}

@@ -1,0 +1,23 @@
+//! What a run leaves behind: draws as CmdStan CSV, a run directory, pictures, tables, and a page that shows all of it.
+//!
+//! Nothing here prints or decides; it turns results into text and files. It knows draws, diagnostics and plain pixel
+//! buffers, not programs, traces or the renderer.
+
+pub mod csv;
+mod draws;
+mod hash;
+pub mod html;
+pub mod npy;
+mod number;
+pub mod pictures;
+mod rundir;
+mod sinks;
+pub mod table;
+mod warnings;
+
+pub use draws::{ChainDraws, Quantity, quantities};
+pub use hash::text_hash;
+pub use number::{clock, count, number};
+pub use rundir::{ChainInfo, ProgramInfo, RunDir, RunDirError, RunInfo, RunState, SummaryEntry};
+pub use sinks::{Memory, Tee};
+pub use warnings::warnings;
