@@ -1,3 +1,0 @@
-//! stub
-#![allow(missing_docs)]
-pub mod address; pub mod builtins; pub mod code; pub mod error; pub mod index; pub mod key; pub mod value;
