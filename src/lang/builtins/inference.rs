@@ -10,8 +10,10 @@ const CHOICES: &str = "Selections and starts";
 const MONITORS: &str = "Monitors and reports";
 
 /// What this version checks and documents but cannot run.
-pub(super) const PLANNED: &[&str] =
-    &["slice", "hmc", "nuts", "mala", "knn", "delayed", "temper", "smc", "abc", "optimize", "marginal", "keypoints"];
+pub(super) const PLANNED: &[&str] = &[
+    "slice", "hmc", "nuts", "mala", "knn", "delayed", "temper", "smc", "abc", "optimize", "marginal", "acceptance", "rhat",
+    "ess", "snapshot", "keypoints",
+];
 
 const fn name(
     name: &'static str,
@@ -33,28 +35,28 @@ pub(super) const TABLE: &[Builtin] = &[
         KERNELS,
         &[SEL],
         Type::Kernel,
-        "Metropolis-Hastings that proposes each selected choice from its prior, one after another.",
+        "Metropolis-Hastings that draws one of the selected choices anew from its prior.",
     ),
     name(
         "block",
         KERNELS,
         &[SEL],
         Type::Kernel,
-        "Metropolis-Hastings that proposes all selected choices together from their prior.",
+        "Metropolis-Hastings that draws all selected choices together anew from their prior.",
     ),
     name(
         "drift",
         KERNELS,
-        &[SEL, opt("scale", Type::Num, "0.1", "The first step size, in the unconstrained space; warm-up adapts it.")],
+        &[SEL, opt("scale", Type::Num, "learnt", "A fixed step size in the unconstrained space, instead of one learnt in warm-up.")],
         Type::Kernel,
-        "Gaussian random walk on continuous choices in the unconstrained space of their support.",
+        "Gaussian random walk in the unconstrained space of the support; discrete choices step to another value.",
     ),
     name(
         "gibbs",
         KERNELS,
         &[SEL],
         Type::Kernel,
-        "Draws each selected discrete choice from its exact conditional, by enumeration of its values.",
+        "Draws a selected finite discrete choice from its exact conditional, by enumeration of its values.",
     ),
     name(
         "elliptical",
@@ -152,6 +154,13 @@ pub(super) const TABLE: &[Builtin] = &[
         Type::Kernel,
         "How a chain starts; without it, from the prior.",
     ),
+    name(
+        "anneal",
+        CHOICES,
+        &[arg("from", Type::Num, "The temperature at the start, at least 1.")],
+        Type::Kernel,
+        "In `warmup` only: raises the power of the likelihood from `1 / from` to 1 over the warm-up.",
+    ),
     name("prior", CHOICES, &[], Type::Kernel, "A start drawn from the prior."),
     name(
         "best_of",
@@ -167,8 +176,8 @@ pub(super) const TABLE: &[Builtin] = &[
         Type::Any,
         "The present value of a choice, in user kernels and conditions.",
     ),
-    name("elapsed", MONITORS, &[], Type::Num, "The time since sampling began, in seconds."),
-    name("steps", MONITORS, &[], Type::Int, "The number of kernel applications of this chain after warm-up."),
+    name("elapsed", MONITORS, &[], Type::Num, "The time since the chain began, in seconds."),
+    name("steps", MONITORS, &[], Type::Int, "The number of kernel applications of this chain so far."),
     name("acceptance", MONITORS, &[], Type::Num, "The fraction of proposals that this chain accepted after warm-up."),
     name(
         "rhat",

@@ -4,6 +4,7 @@
 //! the same arguments give the same value to the last bit, on every platform.
 
 mod args;
+pub mod data;
 mod elementwise;
 mod forms;
 mod inference;
