@@ -5,8 +5,11 @@
 pub mod diag;
 pub mod dist;
 pub mod geom;
+pub mod infer;
+pub mod lang;
 pub mod num;
 pub mod render;
 pub mod rng;
 pub mod syntax;
+pub mod trace;
 pub mod vision;

@@ -53,6 +53,23 @@ pub struct Code {
     pub assumed: Vec<(Arc<str>, Slot)>,
     /// `sample e;` statements, in order.
     pub samples: Vec<Slot>,
+    /// `force @a = v;` statements, in order.
+    pub forces: Vec<Force>,
+    /// `freeze sel;` statements, in order.
+    pub freezes: Vec<crate::syntax::ast::Expr>,
+    /// Expressions of inference blocks, reports and exports that only read the model, by their place.
+    pub queries: rustc_hash::FxHashMap<Span, Operand>,
+}
+
+/// `force @a = v;`
+#[derive(Clone, Debug)]
+pub struct Force {
+    /// The address.
+    pub target: crate::syntax::ast::Address,
+    /// The value: an operand of the top level.
+    pub value: Operand,
+    /// The statement.
+    pub span: Span,
 }
 
 /// What a block is for.

@@ -89,6 +89,17 @@ pub struct FnDecl {
     pub lambda: Lambda,
 }
 
+/// A kernel declaration.
+#[derive(Clone, Debug, PartialEq)]
+pub struct KernelDecl {
+    /// Its name.
+    pub name: Name,
+    /// The parameters.
+    pub params: Vec<Param>,
+    /// The body.
+    pub body: Vec<KStmt>,
+}
+
 /// Parameters and body, of a named function or of `fn(x) { … }`.
 #[derive(Clone, Debug, PartialEq)]
 pub struct Lambda {
@@ -345,6 +356,8 @@ pub enum BinaryOp {
     Div,
     Rem,
     Pow,
+    /// `a & b`: the choices in both selections.
+    Intersect,
     Eq,
     Ne,
     Lt,

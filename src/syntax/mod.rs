@@ -1,3 +1,34 @@
 //! The surface language: tokens, grammar, syntax tree, spans. Pure: text in, tree and errors out.
+//!
+//! The way of a text: [`lexer`] makes tokens (with [`string`], [`address`]), [`delimiters`] matches their brackets,
+//! the parser generated from `grammar/pcad.lalrpop` builds the tree through [`build`], and [`recover`] repairs and
+//! parses again where it does not fit, with [`advice`] on what was probably meant. [`print`](print()) is the way back.
+
+mod address;
+mod advice;
 pub mod ast;
+mod build;
+mod deep;
+mod delimiters;
+mod error;
+mod expected;
+mod lexer;
+mod parse;
+mod print;
+mod recover;
 pub mod span;
+mod string;
+mod token;
+
+pub use deep::MAX_DEPTH;
+pub use delimiters::MAX_NESTING;
+pub use error::{AddressError, MAX_ERRORS, SyntaxError, SyntaxErrorKind};
+pub use lexer::MAX_TOKENS;
+pub use parse::{parse, parse_expr};
+pub use print::{print, print_expr};
+
+lalrpop_util::lalrpop_mod!(
+    #[allow(clippy::all, missing_docs, unused, unreachable_pub)]
+    grammar,
+    "/pcad.rs"
+);

@@ -4,9 +4,10 @@
 //! empty; every evaluated node that reads a node of another frame is in that node's list of outside users.
 
 use super::choices::Choices;
-use super::journal::Entry;
+use super::journal::{Before, Entry};
 use super::node::*;
-use super::propose::{Draws, Pending};
+use super::propose::{Constraint, Draws, Pending};
+
 use crate::dist::Datum;
 use crate::lang::address::ROOT_HASH;
 use crate::lang::code::{BlockKind, Callee, Code, Op, Operand};
@@ -70,13 +71,19 @@ pub(crate) struct Graph {
     /// The log prior of what this update drew from the prior, and of what it would have to draw to be undone.
     pub drawn: ExactSum,
     pub undrawn: ExactSum,
+    /// The choices this update removed: address hash and stored value.
+    pub removed: Vec<(u64, Datum)>,
+    /// The log Jacobians of choices set through the unconstrained space.
+    pub jacobian: f64,
     /// Choices that appeared and vanished in this update.
     pub appeared: u32,
     pub vanished: u32,
     pub choices: Choices,
     pub draws: Draws,
     /// Values that choices take when they are first drawn.
-    pub constraints: FxHashMap<u64, Datum>,
+    pub constraints: FxHashMap<u64, Constraint>,
+    /// During a query: the sums before it, for probes.
+    pub before: Option<Before>,
     /// False: every update re-runs everything.
     pub incremental: bool,
     pub limits: Limits,
@@ -110,11 +117,14 @@ impl Graph {
             likelihood: ExactSum::default(),
             drawn: ExactSum::default(),
             undrawn: ExactSum::default(),
+            removed: Vec::new(),
+            jacobian: 0.0,
             appeared: 0,
             vanished: 0,
             choices: Choices::default(),
             draws: Draws::default(),
             constraints: FxHashMap::default(),
+            before: None,
             incremental: true,
             limits,
             watched: None,

@@ -68,6 +68,8 @@ impl Graph {
         };
         self.drawn = ExactSum::default();
         self.undrawn = ExactSum::default();
+        self.jacobian = 0.0;
+        self.removed.clear();
         self.appeared = 0;
         self.vanished = 0;
         Before { prior: self.prior.clone(), likelihood: self.likelihood.clone() }

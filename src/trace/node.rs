@@ -212,8 +212,8 @@ pub(crate) struct Memo {
 pub(crate) struct ChoiceSide {
     /// The stored form, if it is not the value.
     pub stored: Option<Datum>,
-    /// The sum of the scores of the elements.
-    pub total: ExactSum,
+    /// The scores of the elements.
+    pub scores: Vec<f64>,
     /// The number of separately addressed elements; [`NONE`] when it is one choice.
     pub elements: u32,
     /// The hash of its address, where that is not a function of its frame.

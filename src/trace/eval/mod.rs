@@ -1,7 +1,7 @@
 //! Evaluating one node, by the kind of its operation. One file a family.
 
 mod call;
-mod choice;
+pub(crate) mod choice;
 mod container;
 mod loops;
 mod observe;

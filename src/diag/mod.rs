@@ -1,0 +1,16 @@
+//! What the user is told when something is wrong: diagnostics, the source text they point into, and their rendering.
+//!
+//! Every phase (syntax, names, types, run time) has its own error type and turns it into a [`Diagnostic`] in one place,
+//! by [`IntoDiagnostic`]. Nothing here prints or reads files: [`render`] returns text.
+
+mod diagnostic;
+mod excerpt;
+mod nearest;
+mod render;
+mod source;
+
+pub use diagnostic::{Diagnostic, IntoDiagnostic, Label, Severity};
+pub use nearest::nearest;
+pub use render::render;
+pub(crate) use source::too_large;
+pub use source::{MAX_SOURCE_BYTES, SourceFile, SourceMap};

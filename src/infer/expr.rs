@@ -1,0 +1,141 @@
+//! Expressions of inference blocks: counts, weights, conditions. They see the block's own variables, the model's top-level
+//! names, and what is known of the run.
+
+use super::selection::fail;
+use crate::lang::builtins::{Args, Kind};
+use crate::lang::code::Code;
+use crate::lang::error::RunError;
+use crate::lang::index::index_value;
+use crate::lang::value::Value;
+use crate::syntax::ast::{BinaryOp, Expr, ExprKind, UnaryOp};
+use crate::trace::{Draws, Trace};
+use std::sync::Arc;
+use std::time::Instant;
+
+/// What an expression can see.
+pub(crate) struct Scope<'a> {
+    pub code: &'a Arc<Code>,
+    pub trace: &'a mut Trace,
+    /// The variables of the block, innermost last.
+    pub variables: &'a [(Arc<str>, Value)],
+    pub draws: Draws,
+    pub started: Instant,
+    pub steps: u64,
+}
+
+/// Evaluates an expression.
+///
+/// # Errors
+/// What goes wrong, at its place.
+pub(crate) fn evaluate(e: &Expr, env: &mut Scope) -> Result<Value, Box<RunError>> {
+    match &e.kind {
+        ExprKind::Num(x) => Ok(Value::Num(*x)),
+        ExprKind::Bool(b) => Ok(Value::Bool(*b)),
+        ExprKind::Str(s) => Ok(Value::Str(Arc::clone(s))),
+        ExprKind::Var(name) => variable(name, e, env),
+        ExprKind::Array(xs) => {
+            let xs: Result<Vec<Value>, _> = xs.iter().map(|x| evaluate(x, env)).collect();
+            xs.map(Value::from_elements)
+        }
+        ExprKind::Record(fields) => {
+            let fields: Result<_, Box<RunError>> =
+                fields.iter().map(|(k, v)| Ok((Arc::clone(&k.node), evaluate(v, env)?))).collect();
+            fields.map(|f| Value::Record(Arc::new(f)))
+        }
+        ExprKind::Index { base, index } => {
+            let (b, i) = (evaluate(base, env)?, evaluate(index, env)?);
+            index_value(&b, &i).map_err(|f| fail(e.span, f.message))
+        }
+        ExprKind::Field { base, field } => {
+            let b = evaluate(base, env)?;
+            index_value(&b, &Value::Str(Arc::clone(&field.node))).map_err(|f| fail(e.span, f.message))
+        }
+        ExprKind::Unary { op, expr } => {
+            let v = evaluate(expr, env)?;
+            let name = match op {
+                UnaryOp::Neg => "neg",
+                UnaryOp::Not => "not",
+            };
+            builtin(name, &[&v], e, env)
+        }
+        ExprKind::Binary { op, left, right } => {
+            let a = evaluate(left, env)?;
+            match (op, &a) {
+                (BinaryOp::And, Value::Bool(false)) => return Ok(Value::Bool(false)),
+                (BinaryOp::Or, Value::Bool(true)) => return Ok(Value::Bool(true)),
+                _ => {}
+            }
+            let b = evaluate(right, env)?;
+            match op {
+                BinaryOp::And | BinaryOp::Or => Ok(b),
+                _ => builtin(operator(*op), &[&a, &b], e, env),
+            }
+        }
+        ExprKind::Call { callee, args } => {
+            let ExprKind::Var(name) = &callee.kind else { return Err(unsupported(e)) };
+            match &**name {
+                "elapsed" => return Ok(Value::Num(env.started.elapsed().as_secs_f64())),
+                "steps" => return Ok(Value::Num(env.steps as f64)),
+                "log_joint" => return Ok(Value::Num(env.trace.log_joint())),
+                "log_prior" => return Ok(Value::Num(env.trace.log_prior())),
+                "log_likelihood" => return Ok(Value::Num(env.trace.log_likelihood())),
+                _ => {}
+            }
+            let values: Result<Vec<Value>, _> = args.iter().map(|a| evaluate(&a.value, env)).collect();
+            let values = values?;
+            builtin(name, &values.iter().collect::<Vec<_>>(), e, env)
+        }
+        _ => Err(unsupported(e)),
+    }
+}
+
+fn variable(name: &Arc<str>, e: &Expr, env: &mut Scope) -> Result<Value, Box<RunError>> {
+    if let Some((_, v)) = env.variables.iter().rev().find(|(n, _)| n == name) {
+        return Ok(v.clone());
+    }
+    match env.trace.global(name, env.draws) {
+        Some(v) => v,
+        None => Err(fail(e.span, format!("`{name}` is not known here"))),
+    }
+}
+
+fn builtin(name: &str, values: &[&Value], e: &Expr, env: &Scope) -> Result<Value, Box<RunError>> {
+    let found = env.code.builtins.find("", name).map(|i| env.code.builtins.get(i));
+    match found {
+        Some(b) => match b.kind {
+            Kind::Function(f) => f(&Args { builtin: b, values }).map_err(|f| {
+                let mut error = fail(e.span, f.message);
+                error.hint = f.hint;
+                error
+            }),
+            _ => Err(fail(e.span, format!("`{name}` is not available in this place"))),
+        },
+        None => Err(fail(e.span, format!("`{name}` is not known here"))),
+    }
+}
+
+fn unsupported(e: &Expr) -> Box<RunError> {
+    fail(e.span, "this expression cannot be used in an inference block".into())
+}
+
+/// The name of the built-in behind an operator.
+fn operator(op: BinaryOp) -> &'static str {
+    match op {
+        BinaryOp::Add => "+",
+        BinaryOp::Sub => "-",
+        BinaryOp::Mul => "*",
+        BinaryOp::Div => "/",
+        BinaryOp::Rem => "%",
+        BinaryOp::Pow => "**",
+        BinaryOp::Intersect => "&",
+        BinaryOp::Eq => "==",
+        BinaryOp::Ne => "!=",
+        BinaryOp::Lt => "<",
+        BinaryOp::Le => "<=",
+        BinaryOp::Gt => ">",
+        BinaryOp::Ge => ">=",
+        BinaryOp::And => "and",
+        BinaryOp::Or => "or",
+        BinaryOp::Range => "..",
+    }
+}

@@ -1,0 +1,64 @@
+//! `force @a = v`: sets a choice at the start of a chain; it keeps its prior score and may be proposed again.
+
+use super::plan::RunOptions;
+use super::selection::fail;
+use crate::lang::code::Code;
+use crate::lang::error::RunError;
+use crate::rng::{Purpose, StreamKey};
+use crate::trace::{Address, AddressSegment, Change, Draws, Trace};
+use crate::syntax::ast;
+use std::sync::Arc;
+
+/// Applies the program's `force` statements in order.
+///
+/// # Errors
+/// If an address is not that of one choice, or the value does not fit it.
+pub(crate) fn apply(code: &Arc<Code>, trace: &mut Trace, options: &RunOptions, chain: u32) -> Result<(), Box<RunError>> {
+    let draws = Draws { key: StreamKey::new(options.seed, chain, Purpose::START), step: u64::MAX, lane: 0 };
+    for f in &code.forces {
+        let value = trace.query(&[f.value], draws)?.swap_remove(0);
+        let Some(address) = literal(&f.target) else {
+            return Err(fail(f.span, "`force` needs the address of one choice, without wildcards".into()));
+        };
+        let Some(target) = trace.find(&address) else {
+            let known: Vec<String> = trace.choices().iter().map(|(a, _, _)| a.to_string()).collect();
+            let mut e = fail(f.span, format!("there is no choice {address} among those the observations ask for"));
+            let near = crate::diag::nearest(&address.to_string(), known.iter().map(String::as_str));
+            e.hint = near.map(|n| format!("did you mean {n}?"));
+            return Err(e);
+        };
+        let dist = trace.dist(target);
+        let datum = value.to_datum().and_then(|d| match &dist {
+            Some(dist) if dist.is_stored_whitened() => dist.unrealise(&d),
+            _ => Some(d),
+        });
+        let Some(datum) = datum else {
+            return Err(fail(f.span, format!("{address} cannot be {}", value.type_name())));
+        };
+        trace.propose(&[(target, Change::Set(datum))], draws)?;
+        trace.commit();
+        if trace.log_prior() == f64::NEG_INFINITY {
+            return Err(fail(f.span, format!("{address} cannot be {value}: its prior density there is zero")));
+        }
+    }
+    Ok(())
+}
+
+/// The address an address literal stands for, if it has no wildcards or computed keys.
+pub(crate) fn literal(a: &ast::Address) -> Option<Address> {
+    let mut segments = Vec::with_capacity(a.segments.len());
+    for s in &a.segments {
+        let ast::SegmentName::Name(name) = &s.name else { return None };
+        let keys: Option<Vec<_>> = s
+            .keys
+            .iter()
+            .map(|k| match k {
+                ast::Key::Str(s) => Some(crate::lang::key::Key::Str(Arc::clone(s))),
+                ast::Key::Num(x) => crate::lang::key::Key::num(*x),
+                _ => None,
+            })
+            .collect();
+        segments.push(AddressSegment { name: Arc::clone(name), occurrence: s.occurrence.max(1), keys: keys? });
+    }
+    Some(Address { segments })
+}

@@ -1,0 +1,36 @@
+//! Blocked Metropolis-Hastings from the prior: q_block of Kulkarni et al. 2014, section 3.
+
+use crate::infer::kernel::{At, Kernel, Outcome, Registered, Scope, decide, recoverable};
+use crate::trace::{Trace, TraceResult};
+
+/// `block(sel)`: draws all selected choices anew from their priors, together. Choices that appear or vanish in consequence
+/// pay for themselves, so the selection may change with the state.
+#[derive(Clone, Debug)]
+pub struct Block {
+    scope: Registered,
+}
+
+impl Block {
+    /// The kernel for these choices.
+    pub fn new(scope: Scope) -> Self {
+        Block { scope: Registered::new(scope) }
+    }
+}
+
+impl Kernel for Block {
+    fn name(&self) -> String {
+        "block".into()
+    }
+
+    fn step(&mut self, trace: &mut Trace, at: &At) -> TraceResult<Outcome> {
+        let mut rng = at.stream();
+        let (targets, ways) = self.scope.members(trace, &mut rng);
+        if targets.is_empty() {
+            return Ok(Outcome::default());
+        }
+        let proposed = trace.regenerate(&targets, at.draws(0));
+        let Some(weight) = recoverable(proposed)? else { return Ok(Outcome::failed()) };
+        let ratio = at.tempered(&weight) + ways - self.scope.ways_back(trace);
+        Ok(decide(trace, ratio, &mut rng))
+    }
+}

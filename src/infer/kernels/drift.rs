@@ -1,0 +1,210 @@
+//! Random walks in the unconstrained space, with scales learnt in warm-up.
+//!
+//! A continuous choice moves by a Gaussian step of its image under the transform of its support; the step is taken in the
+//! coordinates of the state, the new value is read in those of the proposed state, and the log Jacobians of both are in the
+//! ratio. That is right also for a support that depends on another choice of the block. A finite discrete choice moves to
+//! another of its values, an unbounded integer by a few units.
+
+use crate::dist::{Datum, Support};
+use crate::infer::kernel::{At, Kernel, Outcome, Registered, Scope, decide, recoverable};
+use crate::rng::Stream;
+use crate::trace::{Change, Target, Trace, TraceResult};
+use rustc_hash::FxHashMap;
+
+/// The acceptance rates aimed at in one dimension and in many (Roberts & Rosenthal 2001).
+const ONE_D: f64 = 0.44;
+const MANY_D: f64 = 0.234;
+
+/// `drift(sel, scale)`: a random walk in the unconstrained space.
+#[derive(Clone, Debug)]
+pub struct Drift {
+    scope: Registered,
+    initial: f64,
+    adaptive: bool,
+    /// By address when one choice moves at a time; under 0 when all move together.
+    scales: FxHashMap<u64, Scale>,
+    /// By address: the spread of each choice in the unconstrained space, for joint moves.
+    spreads: FxHashMap<u64, Spread>,
+}
+
+#[derive(Clone, Copy, Debug)]
+struct Scale {
+    log: f64,
+    steps: f64,
+}
+
+/// A running variance (Welford 1962), pooled over the coordinates of a choice.
+#[derive(Clone, Debug, Default)]
+struct Spread {
+    count: f64,
+    mean: Vec<f64>,
+    square: f64,
+}
+
+impl Spread {
+    fn add(&mut self, y: &[f64]) {
+        if self.mean.len() != y.len() {
+            *self = Spread { count: 0.0, mean: vec![0.0; y.len()], square: 0.0 };
+        }
+        self.count += 1.0;
+        for (m, y) in self.mean.iter_mut().zip(y) {
+            let d = y - *m;
+            *m += d / self.count;
+            self.square += d * (y - *m);
+        }
+    }
+
+    fn sd(&self) -> f64 {
+        let n = self.mean.len() as f64;
+        if self.count < 20.0 || n == 0.0 { return 1.0 }
+        (self.square / (n * (self.count - 1.0))).sqrt().clamp(1e-3, 1e3)
+    }
+}
+
+/// The part of the proposal ratio that is known before the update.
+struct Move {
+    change: Change,
+    /// The log Jacobian at the old point, or the log number of values it could have moved to.
+    old_term: f64,
+    /// Whether the choice jumped among finitely many values.
+    finite: bool,
+    dimensions: usize,
+}
+
+impl Drift {
+    /// The kernel for these choices. Without a scale it is learnt in warm-up.
+    pub fn new(scope: Scope, scale: Option<f64>) -> Self {
+        Drift {
+            scope: Registered::new(scope),
+            initial: scale.unwrap_or(0.5),
+            adaptive: scale.is_none(),
+            scales: FxHashMap::default(),
+            spreads: FxHashMap::default(),
+        }
+    }
+
+    fn propose_one(&self, trace: &Trace, t: Target, scale: f64, rng: &mut Stream) -> Option<Move> {
+        let dist = trace.dist(t)?;
+        let stored = trace.stored(t)?;
+        let support = dist.stored_support();
+        if support.is_discrete() {
+            return discrete_move(&support, &stored, scale, rng);
+        }
+        let mut y = Vec::with_capacity(support.free_dim());
+        support.to_free(&stored, &mut y);
+        let old_term = support.from_free(&y).1;
+        let dimensions = y.len();
+        for v in &mut y {
+            *v += scale * rng.standard_normal();
+        }
+        Some(Move { change: Change::Free(y), old_term, finite: false, dimensions })
+    }
+
+    fn key(&self, trace: &Trace, targets: &[Target]) -> u64 {
+        if self.scope.scope.one { trace.address_hash(targets[0]) } else { 0 }
+    }
+
+    fn adapt(&mut self, key: u64, accepted: bool, dimensions: usize) {
+        let aim = if dimensions <= 1 { ONE_D } else { MANY_D };
+        if let Some(s) = self.scales.get_mut(&key) {
+            s.steps += 1.0;
+            let gain = libm::pow(s.steps, -0.6);
+            s.log += gain * (f64::from(u8::from(accepted)) - aim) * 2.0;
+            s.log = s.log.clamp(-20.0, 6.0);
+        }
+    }
+}
+
+fn discrete_move(support: &Support, stored: &Datum, scale: f64, rng: &mut Stream) -> Option<Move> {
+    if let Some(values) = support.finite_values() {
+        let here = values.iter().position(|v| v == stored)?;
+        if values.len() < 2 {
+            return None;
+        }
+        let mut i = rng.index(values.len() - 1);
+        if i >= here {
+            i += 1;
+        }
+        let old_term = -libm::log(values.len() as f64 - 1.0);
+        return Some(Move { change: Change::Set(values[i].clone()), old_term, finite: true, dimensions: 1 });
+    }
+    let Datum::Num(x) = stored else { return None };
+    let reach = 1 + libm::floor(scale.clamp(0.0, 1e6)) as usize;
+    let jump = 1.0 + rng.index(reach) as f64;
+    let to = if rng.uniform() < 0.5 { x + jump } else { x - jump };
+    Some(Move { change: Change::Set(Datum::Num(to)), old_term: 0.0, finite: false, dimensions: 1 })
+}
+
+impl Kernel for Drift {
+    fn name(&self) -> String {
+        "drift".into()
+    }
+
+    fn step(&mut self, trace: &mut Trace, at: &At) -> TraceResult<Outcome> {
+        let mut rng = at.stream();
+        let (targets, ways) = self.scope.members(trace, &mut rng);
+        if targets.is_empty() {
+            return Ok(Outcome::default());
+        }
+        let key = self.key(trace, &targets);
+        let log_scale = libm::log(self.initial);
+        let scale = libm::exp(self.scales.entry(key).or_insert(Scale { log: log_scale, steps: 0.0 }).log);
+        let joint = targets.len() > 1;
+        let mut changes = Vec::with_capacity(targets.len());
+        let mut finite = Vec::new();
+        let mut old_terms = 0.0;
+        let mut jacobians = 0.0;
+        let mut dimensions = 0;
+        for t in &targets {
+            let spread = if joint { self.spreads.get(&trace.address_hash(*t)).map_or(1.0, Spread::sd) } else { 1.0 };
+            let Some(m) = self.propose_one(trace, *t, scale * spread, &mut rng) else { continue };
+            if m.finite {
+                old_terms += m.old_term;
+                finite.push(*t);
+            } else {
+                jacobians += m.old_term;
+            }
+            dimensions += m.dimensions;
+            changes.push((*t, m.change));
+        }
+        if changes.is_empty() {
+            return Ok(Outcome::default());
+        }
+        let proposed = trace.propose(&changes, at.draws(0));
+        let outcome = match recoverable(proposed)? {
+            None => Outcome::failed(),
+            Some(w) => {
+                let mut ratio = at.tempered(&w) + w.log_jacobian - jacobians + ways - self.scope.ways_back(trace);
+                // A jump among k values pays log(k - 1) in each state.
+                for t in &finite {
+                    let values = trace.dist(*t).and_then(|d| d.stored_support().finite_values());
+                    ratio -= libm::log(values.map_or(1.0, |v| (v.len() as f64 - 1.0).max(1.0)));
+                }
+                ratio -= old_terms;
+                decide(trace, ratio, &mut rng)
+            }
+        };
+        if at.adapting && self.adaptive {
+            self.adapt(key, outcome.accepted > 0, dimensions);
+            if joint {
+                self.learn_spreads(trace, &targets);
+            }
+        }
+        Ok(outcome)
+    }
+}
+
+impl Drift {
+    fn learn_spreads(&mut self, trace: &Trace, targets: &[Target]) {
+        for t in targets {
+            let Some((dist, stored)) = trace.dist(*t).zip(trace.stored(*t)) else { continue };
+            let support = dist.stored_support();
+            if support.is_discrete() {
+                continue;
+            }
+            let mut y = Vec::with_capacity(support.free_dim());
+            support.to_free(&stored, &mut y);
+            self.spreads.entry(trace.address_hash(*t)).or_default().add(&y);
+        }
+    }
+}

@@ -1,0 +1,32 @@
+//! Single-site Metropolis-Hastings from the prior: q_single of Kulkarni et al. 2014, section 3.
+
+use crate::infer::kernel::{At, Kernel, Outcome, Registered, Scope, decide, recoverable};
+use crate::trace::{Change, Trace, TraceResult};
+
+/// `mh(sel)`: draws one choice anew from its prior, given the rest.
+#[derive(Clone, Debug)]
+pub struct Mh {
+    scope: Registered,
+}
+
+impl Mh {
+    /// The kernel for one of these choices at a time.
+    pub fn new(scope: Scope) -> Self {
+        Mh { scope: Registered::new(Scope { one: true, ..scope }) }
+    }
+}
+
+impl Kernel for Mh {
+    fn name(&self) -> String {
+        "mh".into()
+    }
+
+    fn step(&mut self, trace: &mut Trace, at: &At) -> TraceResult<Outcome> {
+        let mut rng = at.stream();
+        let Some((target, n)) = self.scope.pick(trace, &mut rng) else { return Ok(Outcome::default()) };
+        let proposed = trace.propose(&[(target, Change::Resample)], at.draws(0));
+        let Some(weight) = recoverable(proposed)? else { return Ok(Outcome::failed()) };
+        let ratio = at.tempered(&weight) + libm::log(n as f64) - self.scope.ways_back(trace);
+        Ok(decide(trace, ratio, &mut rng))
+    }
+}

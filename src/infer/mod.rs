@@ -1,0 +1,20 @@
+//! Inference: kernels, plans, chains, diagnostics. Knows traces; knows nothing of pictures.
+
+mod chains;
+mod default_plan;
+pub mod draws;
+mod expr;
+mod force;
+mod init;
+mod kernel;
+mod kernels;
+mod plan;
+mod record;
+mod selection;
+
+pub use chains::run_chains;
+pub use default_plan::default_plan;
+pub use init::{Start, StartError, start};
+pub use kernel::{At, Kernel, Outcome, Scope};
+pub use kernels::{Block, Drift, Elliptical, Gibbs, Mh};
+pub use plan::{ChainError, ChainResult, Progress, RunOptions};

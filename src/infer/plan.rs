@@ -1,0 +1,579 @@
+//! Running an inference block: one chain, statement by statement.
+
+use super::draws::{DrawRow, KernelStats, Sink};
+use super::expr::{Scope, evaluate};
+use super::init::{Start, StartError, start};
+use super::kernel::{At, Kernel};
+use super::kernels::{Block, Drift, Elliptical, Gibbs, Mh};
+use super::record::Recorder;
+use super::selection::{fail, scope, selector};
+use crate::lang::code::Code;
+use crate::lang::error::RunError;
+use crate::lang::value::Value;
+use crate::rng::{Purpose, StreamKey};
+use crate::syntax::ast::{Expr, ExprKind, KStmt, KStmtKind, MixArm};
+use crate::trace::{Constraint, Draws, Limits, Selector, Trace};
+use std::sync::Arc;
+use std::sync::atomic::{AtomicBool, AtomicU64, Ordering};
+use std::time::{Duration, Instant};
+
+/// Bounds and settings of a run.
+#[derive(Clone, Debug)]
+pub struct RunOptions {
+    /// The seed: same seed, same draws.
+    pub seed: u64,
+    /// Kernel applications per chain after warm-up, in place of the outermost `repeat`'s count.
+    pub steps: Option<u64>,
+    /// Kernel applications per chain in warm-up, in place of what the program says.
+    pub warmup: Option<u64>,
+    /// Time in all; the run ends at the next step. At most half of it goes to warm-up.
+    pub time: Option<Duration>,
+    /// False: every update re-runs the whole program.
+    pub incremental: bool,
+    /// Bounds on what the program may build.
+    pub limits: Limits,
+}
+
+impl Default for RunOptions {
+    fn default() -> Self {
+        RunOptions { seed: 0, steps: None, warmup: None, time: None, incremental: true, limits: Limits::default() }
+    }
+}
+
+/// What is shared between the chains and whoever watches them.
+#[derive(Debug, Default)]
+pub struct Progress {
+    /// Set to end the run at the next step.
+    pub cancelled: AtomicBool,
+    /// Steps of all chains.
+    pub steps: AtomicU64,
+    /// The best log joint density of any chain, as bits.
+    pub best: AtomicU64,
+}
+
+/// What a chain leaves.
+#[derive(Debug)]
+pub struct ChainResult {
+    /// Its last state.
+    pub last: Trace,
+    /// The choices of its best recorded draw, and its log joint density.
+    pub best: Option<(f64, Vec<(u64, Constraint)>)>,
+    /// Kernel applications after and in warm-up.
+    pub steps: u64,
+    /// See `steps`.
+    pub warmup: u64,
+    /// Draws recorded.
+    pub draws: u64,
+    /// What the kernels did.
+    pub kernels: Vec<KernelStats>,
+    /// Wall time.
+    pub seconds: f64,
+}
+
+/// Why a chain ended early.
+#[derive(Debug)]
+pub enum ChainError {
+    /// It could not start.
+    Start(StartError),
+    /// The program failed.
+    Run(Box<RunError>),
+    /// The draws could not be written.
+    Sink(std::io::Error),
+}
+
+impl From<Box<RunError>> for ChainError {
+    fn from(e: Box<RunError>) -> Self {
+        ChainError::Run(e)
+    }
+}
+
+/// How a statement ended.
+#[derive(Clone, Copy, Debug, PartialEq, Eq)]
+enum Flow {
+    Next,
+    /// `stop`: the enclosing loop ends.
+    Stop,
+    /// The run ends: steps or time used up, or cancelled.
+    End,
+}
+
+/// A kernel that has run: where it stands in the program, on what, and what it did.
+struct Instance {
+    place: usize,
+    selector: Selector,
+    kernel: Box<dyn Kernel>,
+    stats: KernelStats,
+}
+
+pub(crate) struct Runner<'a> {
+    code: &'a Arc<Code>,
+    options: &'a RunOptions,
+    progress: &'a Progress,
+    sink: &'a mut dyn Sink,
+    chain: u32,
+    trace: Trace,
+    variables: Vec<(Arc<str>, Value)>,
+    instances: Vec<Instance>,
+    recorder: Recorder,
+    frozen: Selector,
+    started: Instant,
+    step: u64,
+    warmup_steps: u64,
+    in_warmup: bool,
+    loops: u32,
+    power: f64,
+    best: Option<(f64, Vec<(u64, Constraint)>)>,
+    draws: u64,
+}
+
+/// Runs one chain of a plan.
+///
+/// # Errors
+/// If it cannot start, the program fails, or the sink does.
+pub(crate) fn run_chain(
+    code: &Arc<Code>,
+    plan: &[KStmt],
+    options: &RunOptions,
+    progress: &Progress,
+    sink: &mut dyn Sink,
+    chain: u32,
+) -> Result<ChainResult, ChainError> {
+    let started = Instant::now();
+    let how = start_of(code, plan, options)?;
+    let mut trace = start(code, options.seed, chain, how, options.limits).map_err(ChainError::Start)?;
+    trace.set_incremental(options.incremental);
+    let mut runner = Runner {
+        code,
+        options,
+        progress,
+        sink,
+        chain,
+        trace,
+        variables: Vec::new(),
+        instances: Vec::new(),
+        recorder: Recorder::new(code, plan),
+        frozen: Selector::Nothing,
+        started,
+        step: 0,
+        warmup_steps: 0,
+        in_warmup: false,
+        loops: 0,
+        power: 1.0,
+        best: None,
+        draws: 0,
+    };
+    runner.force_and_freeze()?;
+    runner.body(plan)?;
+    if runner.draws == 0 {
+        runner.record(None)?;
+    }
+    let seconds = started.elapsed().as_secs_f64();
+    let (steps, warmup) = (runner.step - runner.warmup_steps, runner.warmup_steps);
+    runner.sink.chain_done(chain, steps, warmup, seconds).map_err(ChainError::Sink)?;
+    Ok(ChainResult {
+        last: runner.trace,
+        best: runner.best,
+        steps,
+        warmup,
+        draws: runner.draws,
+        kernels: runner.instances.into_iter().map(|i| i.stats).collect(),
+        seconds,
+    })
+}
+
+/// What the `init` statement of a plan asks for.
+fn start_of(code: &Arc<Code>, plan: &[KStmt], options: &RunOptions) -> Result<Start, ChainError> {
+    let init = plan.iter().find_map(|s| match &s.kind {
+        KStmtKind::Expr(e) => call(e).filter(|(name, _)| *name == "init").map(|(_, args)| (e, args)),
+        _ => None,
+    });
+    let Some((e, args)) = init else { return Ok(Start::Prior) };
+    let wrong = || ChainError::Run(fail(e.span, "init takes prior() or best_of(n)".into()));
+    let [how] = args else { return Err(wrong()) };
+    match call(&how.value) {
+        Some(("prior", [])) => Ok(Start::Prior),
+        Some(("best_of", [n])) => {
+            let mut trace = Trace::prior(Arc::clone(code), options.limits);
+            let mut env = Scope {
+                code,
+                trace: &mut trace,
+                variables: &[],
+                draws: Draws::default(),
+                started: Instant::now(),
+                steps: 0,
+            };
+            match evaluate(&n.value, &mut env)? {
+                Value::Num(x) if x >= 1.0 => Ok(Start::BestOf(x as u64)),
+                v => Err(ChainError::Run(fail(n.value.span, format!("a number of draws was expected, got {v}")))),
+            }
+        }
+        _ => Err(wrong()),
+    }
+}
+
+/// The name and arguments of a call.
+fn call(e: &Expr) -> Option<(&str, &[crate::syntax::ast::Arg])> {
+    match &e.kind {
+        ExprKind::Call { callee, args } => match &callee.kind {
+            ExprKind::Var(name) => Some((name, args)),
+            _ => None,
+        },
+        _ => None,
+    }
+}
+
+impl Runner<'_> {
+    fn at(&self) -> At {
+        At {
+            seed: self.options.seed,
+            chain: self.chain,
+            step: self.step,
+            adapting: self.in_warmup,
+            power: self.power,
+        }
+    }
+
+    fn predictive(&self) -> Draws {
+        let key = StreamKey::new(self.options.seed, self.chain, Purpose::PREDICT);
+        Draws { key, step: self.step, lane: 0 }
+    }
+
+    fn value(&mut self, e: &Expr) -> Result<Value, Box<RunError>> {
+        let draws = self.predictive();
+        let mut env = Scope {
+            code: self.code,
+            trace: &mut self.trace,
+            variables: &self.variables,
+            draws,
+            started: self.started,
+            steps: self.step,
+        };
+        evaluate(e, &mut env)
+    }
+
+    fn count(&mut self, e: &Expr) -> Result<u64, Box<RunError>> {
+        match self.value(e)? {
+            Value::Num(x) if x >= 0.0 && x == libm::trunc(x) => Ok(x as u64),
+            v => Err(fail(e.span, format!("a whole number of times was expected, got {v}"))),
+        }
+    }
+
+    /// Applies the program's `force` and `freeze`.
+    fn force_and_freeze(&mut self) -> Result<(), ChainError> {
+        for f in &self.code.freezes {
+            let draws = self.predictive();
+            let mut env = Scope {
+                code: self.code,
+                trace: &mut self.trace,
+                variables: &[],
+                draws,
+                started: self.started,
+                steps: 0,
+            };
+            let s = selector(f, &mut env)?;
+            self.frozen = match std::mem::replace(&mut self.frozen, Selector::Nothing) {
+                Selector::Nothing => s,
+                old => Selector::Union(Box::new(old), Box::new(s)),
+            };
+        }
+        super::force::apply(self.code, &mut self.trace, self.options, self.chain)?;
+        Ok(())
+    }
+
+    fn body(&mut self, stmts: &[KStmt]) -> Result<Flow, ChainError> {
+        for s in stmts {
+            match self.statement(s)? {
+                Flow::Next => {}
+                flow => return Ok(flow),
+            }
+        }
+        Ok(Flow::Next)
+    }
+
+    fn statement(&mut self, s: &KStmt) -> Result<Flow, ChainError> {
+        match &s.kind {
+            KStmtKind::Warmup { count, body } => self.warmup(count, body),
+            KStmtKind::Repeat { count, body } => self.repeat(count, body),
+            KStmtKind::Every { count, body } => {
+                let n = self.count(count)?.max(1);
+                let pass = self.variables.iter().rev().find(|(name, _)| &**name == PASS);
+                match pass {
+                    Some((_, Value::Num(i))) if (*i as u64 + 1).is_multiple_of(n) => self.body(body),
+                    _ => Ok(Flow::Next),
+                }
+            }
+            KStmtKind::Mix(arms) => self.mix(arms),
+            KStmtKind::For { var, iter, body } => {
+                let over = self.value(iter)?;
+                let items: Vec<Value> = match &over {
+                    Value::Record(r) => r.keys().map(|k| Value::Str(Arc::clone(k))).collect(),
+                    v => (0..v.len().unwrap_or(0)).filter_map(|i| v.element(i)).collect(),
+                };
+                for item in items {
+                    self.variables.push((Arc::clone(&var.node), item));
+                    let flow = self.body(body);
+                    self.variables.pop();
+                    match flow? {
+                        Flow::Next => {}
+                        Flow::Stop => break,
+                        Flow::End => return Ok(Flow::End),
+                    }
+                }
+                Ok(Flow::Next)
+            }
+            KStmtKind::StopWhen(cond) => match self.value(cond)? {
+                Value::Bool(true) => Ok(Flow::Stop),
+                Value::Bool(false) => Ok(Flow::Next),
+                v => Err(fail(cond.span, format!("`stop when` needs a bool, got {}", v.type_name())).into()),
+            },
+            KStmtKind::Collect(exprs) => {
+                if !self.in_warmup {
+                    self.record(Some(exprs))?;
+                }
+                Ok(Flow::Next)
+            }
+            KStmtKind::Let { name, expr } => {
+                let v = self.value(expr)?;
+                self.variables.push((Arc::clone(&name.node), v));
+                Ok(Flow::Next)
+            }
+            KStmtKind::Propose { .. } => Err(fail(s.span, "`propose` belongs in a kernel".into()).into()),
+            KStmtKind::Expr(e) => self.apply(e),
+        }
+    }
+
+    fn warmup(&mut self, count: &Expr, body: &[KStmt]) -> Result<Flow, ChainError> {
+        let passes = self.count(count)?;
+        self.in_warmup = true;
+        let mut flow = Flow::Next;
+        let mut i = 0;
+        while self.options.warmup.is_some() || i < passes {
+            flow = self.pass(i, passes, body)?;
+            i += 1;
+            if flow != Flow::Next {
+                break;
+            }
+        }
+        self.in_warmup = false;
+        self.power = 1.0;
+        self.warmup_steps = self.step;
+        Ok(if flow == Flow::End && self.is_cancelled() { Flow::End } else { Flow::Next })
+    }
+
+    fn repeat(&mut self, count: &Expr, body: &[KStmt]) -> Result<Flow, ChainError> {
+        let passes = self.count(count)?;
+        let outermost = self.loops == 0 && !self.in_warmup;
+        let unbounded = outermost && (self.options.steps.is_some() || self.options.time.is_some());
+        let mut i = 0;
+        while unbounded || i < passes {
+            let flow = self.pass(i, passes, body)?;
+            i += 1;
+            match flow {
+                Flow::Next => {}
+                Flow::Stop => break,
+                Flow::End => return Ok(Flow::End),
+            }
+            if outermost && !self.recorder.collects() {
+                self.record(None)?;
+            }
+        }
+        Ok(Flow::Next)
+    }
+
+    /// One pass of a loop.
+    fn pass(&mut self, i: u64, of: u64, body: &[KStmt]) -> Result<Flow, ChainError> {
+        if self.is_over() {
+            return Ok(Flow::End);
+        }
+        let depth = self.variables.len();
+        self.variables.push((Arc::from(PASS), Value::Num(i as f64)));
+        self.variables.push((Arc::from(PASSES), Value::Num(of as f64)));
+        self.loops += 1;
+        let flow = self.body(body);
+        self.loops -= 1;
+        self.variables.truncate(depth);
+        flow
+    }
+
+    fn is_cancelled(&self) -> bool {
+        self.progress.cancelled.load(Ordering::Relaxed)
+    }
+
+    /// Whether the run, or the warm-up, has used up what it was given.
+    fn is_over(&self) -> bool {
+        if self.is_cancelled() {
+            return true;
+        }
+        let used = self.step - self.warmup_steps;
+        let bound = if self.in_warmup { self.options.warmup } else { self.options.steps };
+        if bound.is_some_and(|n| used >= n) {
+            return true;
+        }
+        match self.options.time {
+            Some(t) => self.started.elapsed() >= if self.in_warmup { t / 2 } else { t },
+            None => false,
+        }
+    }
+
+    fn mix(&mut self, arms: &[MixArm]) -> Result<Flow, ChainError> {
+        let mut weights = Vec::with_capacity(arms.len());
+        for a in arms {
+            match self.value(&a.weight)? {
+                Value::Num(w) if w >= 0.0 && w.is_finite() => weights.push(w),
+                v => return Err(fail(a.weight.span, format!("a weight must be at least 0, got {v}")).into()),
+            }
+        }
+        let total: f64 = weights.iter().sum();
+        let key = StreamKey::new(self.options.seed, self.chain, Purpose::MIX);
+        let mut u = key.stream(self.step, 0, 0).uniform() * total;
+        for (a, w) in arms.iter().zip(&weights) {
+            if u < *w {
+                return self.apply(&a.kernel);
+            }
+            u -= w;
+        }
+        match arms.last() {
+            Some(a) => self.apply(&a.kernel),
+            None => Ok(Flow::Next),
+        }
+    }
+
+    /// Applies a kernel, or another statement that looks like a call.
+    fn apply(&mut self, e: &Expr) -> Result<Flow, ChainError> {
+        let Some((name, args)) = call(e) else {
+            return Err(fail(e.span, "a kernel such as mh(one(@**)) was expected".into()).into());
+        };
+        match name {
+            "init" => return Ok(Flow::Next),
+            "anneal" => return self.anneal(e, args),
+            _ => {}
+        }
+        let Some(sel) = args.first() else {
+            return Err(fail(e.span, format!("`{name}` needs a selection of choices, e.g. @**")).into());
+        };
+        let draws = self.predictive();
+        let mut env = Scope {
+            code: self.code,
+            trace: &mut self.trace,
+            variables: &self.variables,
+            draws,
+            started: self.started,
+            steps: self.step,
+        };
+        let mut scope = scope(&sel.value, &mut env)?;
+        if self.frozen != Selector::Nothing {
+            scope.selector = Selector::Minus(Box::new(scope.selector), Box::new(self.frozen.clone()));
+        }
+        let place = e as *const Expr as usize;
+        let known = self.instances.iter().position(|i| i.place == place && i.selector == scope.selector);
+        let i = match known {
+            Some(i) => i,
+            None => {
+                let selector = scope.selector.clone();
+                let kernel: Box<dyn Kernel> = match name {
+                    "mh" => Box::new(Mh::new(scope)),
+                    "block" => Box::new(Block::new(scope)),
+                    "gibbs" => Box::new(Gibbs::new(scope)),
+                    "elliptical" => Box::new(Elliptical::new(scope)),
+                    "drift" => {
+                        let scale = match args.get(1) {
+                            None => None,
+                            Some(a) => match self.value(&a.value)? {
+                                Value::Num(s) if s > 0.0 => Some(s),
+                                v => {
+                                    let message = format!("drift: `scale` must be positive, got {v}");
+                                    return Err(fail(a.value.span, message).into());
+                                }
+                            },
+                        };
+                        Box::new(Drift::new(scope, scale))
+                    }
+                    _ => {
+                        let message = format!("the kernel `{name}` is not available yet in this version");
+                        return Err(fail(e.span, message).into());
+                    }
+                };
+                let stats = KernelStats { name: self.label(e), ..Default::default() };
+                self.instances.push(Instance { place, selector, kernel, stats });
+                self.instances.len() - 1
+            }
+        };
+        let at = self.at();
+        let begun = Instant::now();
+        let outcome = self.instances[i].kernel.step(&mut self.trace, &at)?;
+        let stats = &mut self.instances[i].stats;
+        if !self.in_warmup {
+            stats.proposals += u64::from(outcome.proposals);
+            stats.accepted += u64::from(outcome.accepted);
+            stats.failed += u64::from(outcome.failed);
+            stats.seconds += begun.elapsed().as_secs_f64();
+        }
+        self.step += 1;
+        self.progress.steps.fetch_add(1, Ordering::Relaxed);
+        Ok(if self.is_over() { Flow::End } else { Flow::Next })
+    }
+
+    /// The text of a kernel for tables.
+    fn label(&self, e: &Expr) -> String {
+        crate::syntax::print::expr(e)
+    }
+
+    /// `anneal(from)`: raises the power of the likelihood from 1/from to 1 over a warm-up.
+    fn anneal(&mut self, e: &Expr, args: &[crate::syntax::ast::Arg]) -> Result<Flow, ChainError> {
+        if !self.in_warmup {
+            return Err(fail(e.span, "anneal belongs in a warmup: its draws are discarded".into()).into());
+        }
+        let from = match args {
+            [a] => match self.value(&a.value)? {
+                Value::Num(t) if t >= 1.0 => t,
+                v => return Err(fail(a.value.span, format!("a temperature of at least 1 was expected, got {v}")).into()),
+            },
+            _ => return Err(fail(e.span, "anneal takes one temperature to start from".into()).into()),
+        };
+        let number = |name: &str| match self.variables.iter().rev().find(|(n, _)| &**n == name) {
+            Some((_, Value::Num(x))) => *x,
+            _ => 0.0,
+        };
+        // With a time limit, by the clock: the steps are recorded, and a replay by steps counts passes instead.
+        let share = match (self.options.warmup, self.options.time) {
+            (Some(n), _) => self.step as f64 / (n.max(1) as f64),
+            (None, Some(t)) => {
+                let clock = self.started.elapsed().as_secs_f64() / (t.as_secs_f64() / 2.0);
+                clock.max(number(PASS) / number(PASSES).max(1.0))
+            }
+            (None, None) => number(PASS) / number(PASSES).max(1.0),
+        };
+        self.power = libm::pow(from, -(1.0 - share.clamp(0.0, 1.0)));
+        Ok(Flow::Next)
+    }
+
+    /// Records a draw.
+    fn record(&mut self, exprs: Option<&[Expr]>) -> Result<(), ChainError> {
+        let draws = self.predictive();
+        let values = self.recorder.values(self.code, &mut self.trace, exprs, draws)?;
+        if self.draws == 0 {
+            self.recorder.fix_columns(&values);
+            self.sink.columns(self.recorder.columns()).map_err(ChainError::Sink)?;
+        }
+        let log_joint = self.trace.log_joint();
+        let row = DrawRow {
+            chain: self.chain,
+            draw: self.draws,
+            step: self.step,
+            log_joint,
+            log_prior: self.trace.log_prior(),
+            log_likelihood: self.trace.log_likelihood(),
+            values: self.recorder.flatten(&values),
+        };
+        self.sink.draw(&row).map_err(ChainError::Sink)?;
+        self.draws += 1;
+        if self.best.as_ref().is_none_or(|(b, _)| log_joint > *b) {
+            self.best = Some((log_joint, self.trace.constraints()));
+        }
+        Ok(())
+    }
+}
+
+/// The variables a loop keeps for `every` and `anneal`; not names a program can write.
+const PASS: &str = "#pass";
+const PASSES: &str = "#passes";

@@ -1,0 +1,121 @@
+//! From the selections people write to [`Selector`]s.
+
+use super::expr::{Scope, evaluate};
+use super::kernel;
+use crate::lang::error::{FaultKind, RunError};
+use crate::lang::key::Key;
+use crate::syntax::ast::{self, BinaryOp, Expr, ExprKind, SegmentName};
+use crate::syntax::span::Span;
+use crate::trace::{ChoiceKind, Pattern, PatternSegment, Selector};
+use std::sync::Arc;
+
+/// Reads a selection, with `one(…)` around it or not.
+///
+/// # Errors
+/// If the expression is not a selection, or a computed key fails.
+pub(crate) fn scope(e: &Expr, env: &mut Scope) -> Result<kernel::Scope, Box<RunError>> {
+    if let ExprKind::Call { callee, args } = &e.kind
+        && matches!(&callee.kind, ExprKind::Var(name) if &**name == "one")
+        && let [arg] = &args[..]
+    {
+        return Ok(kernel::Scope { selector: selector(&arg.value, env)?, one: true });
+    }
+    Ok(kernel::Scope { selector: selector(e, env)?, one: false })
+}
+
+/// Reads a selection.
+///
+/// # Errors
+/// As [`scope`].
+pub(crate) fn selector(e: &Expr, env: &mut Scope) -> Result<Selector, Box<RunError>> {
+    match &e.kind {
+        ExprKind::Address(a) => pattern(a, env).map(|p| match &p.segments[..] {
+            [PatternSegment::Deep] => Selector::All,
+            _ => Selector::Address(p),
+        }),
+        ExprKind::TagSel { name, value } => Ok(tag(name, value.as_ref())),
+        ExprKind::Binary { op, left, right } => {
+            let (a, b) = (Box::new(selector(left, env)?), Box::new(selector(right, env)?));
+            match op {
+                BinaryOp::Add => Ok(Selector::Union(a, b)),
+                BinaryOp::Sub => Ok(Selector::Minus(a, b)),
+                BinaryOp::Intersect => Ok(Selector::Both(a, b)),
+                _ => Err(not_a_selection(e.span)),
+            }
+        }
+        _ => Err(not_a_selection(e.span)),
+    }
+}
+
+fn tag(name: &Arc<str>, value: Option<&Arc<str>>) -> Selector {
+    let kind = match &**name {
+        "continuous" => Some(ChoiceKind::Continuous),
+        "discrete" => Some(ChoiceKind::Discrete),
+        "gaussian" => Some(ChoiceKind::Gaussian),
+        "finite" => Some(ChoiceKind::Finite),
+        _ => None,
+    };
+    match (kind, value) {
+        (Some(k), None) => Selector::Kind(k),
+        _ => Selector::Tag { name: Arc::clone(name), value: value.map(|v| literal_key(v)) },
+    }
+}
+
+/// The key a tag's written value stands for: a number if it reads as one.
+fn literal_key(text: &str) -> Key {
+    match text.parse::<f64>().ok().and_then(Key::num) {
+        Some(k) => k,
+        None => Key::Str(Arc::from(text.trim_matches('"'))),
+    }
+}
+
+/// Reads an address pattern.
+///
+/// # Errors
+/// If a computed key fails or is not a key.
+pub(crate) fn pattern(a: &ast::Address, env: &mut Scope) -> Result<Pattern, Box<RunError>> {
+    let mut segments = Vec::with_capacity(a.segments.len());
+    for s in &a.segments {
+        let name = match &s.name {
+            SegmentName::Deep => {
+                segments.push(PatternSegment::Deep);
+                continue;
+            }
+            SegmentName::Any => None,
+            SegmentName::Name(n) => Some(Arc::clone(n)),
+        };
+        let mut keys = Vec::with_capacity(s.keys.len());
+        for k in &s.keys {
+            keys.push(match k {
+                ast::Key::Str(s) => Some(Key::Str(Arc::clone(s))),
+                ast::Key::Num(x) => Key::num(*x),
+                ast::Key::Any => None,
+                ast::Key::Expr(e) => {
+                    let v = evaluate(e, env)?;
+                    let key = Key::from_value(&v);
+                    Some(key.ok_or_else(|| fail(e.span, format!("{} cannot be a key", v.type_name())))?)
+                }
+            });
+        }
+        segments.push(PatternSegment::Segment { name, occurrence: s.occurrence, keys });
+    }
+    Ok(Pattern { segments })
+}
+
+fn not_a_selection(span: Span) -> Box<RunError> {
+    let mut e = fail(span, "expected a selection of choices".into());
+    e.hint = Some("an address such as @**, a tag such as $affine, or both joined by +, - or &".into());
+    e
+}
+
+/// An error in an inference block.
+pub(crate) fn fail(span: Span, message: String) -> Box<RunError> {
+    Box::new(RunError {
+        kind: FaultKind::Type,
+        message,
+        span,
+        address: Default::default(),
+        calls: Vec::new(),
+        hint: None,
+    })
+}

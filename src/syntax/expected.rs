@@ -1,0 +1,94 @@
+//! What the parser could have gone on with, in words a user knows.
+
+use std::collections::BTreeSet;
+
+/// Tokens that begin expressions (and some that also begin something else).
+const EXPRESSION: [&str; 17] = [
+    "a name",
+    "a number",
+    "a string",
+    "an address",
+    "a tag selection",
+    "true",
+    "false",
+    "not",
+    "-",
+    "(",
+    "[",
+    "{",
+    "if",
+    "fn",
+    "to",
+    "when",
+    "coarse",
+];
+/// Tokens that go on with an expression.
+const OPERATOR: [&str; 20] =
+    ["or", "and", "==", "!=", "<", "<=", ">", ">=", "..", "+", "-", "*", "/", "%", "&", "**", "(", "[", ".", "~"];
+
+/// The names of tokens as the parser lists them, without their quotes.
+pub(super) fn names(expected: &[String]) -> BTreeSet<&str> {
+    expected.iter().map(|e| e.trim_matches('"')).filter(|e| *e != "a bad statement").collect()
+}
+
+/// A list in words: "`,`, `)` or an operator".
+pub(super) fn describe(expected: &[String]) -> String {
+    let mut names = names(expected);
+    let mut words: Vec<String> = Vec::new();
+    let statement = names.contains("let") && names.contains("for");
+    if statement {
+        words.push(if names.contains("include") { "a statement or declaration" } else { "a statement" }.to_owned());
+        let close = names.contains("}");
+        names.clear();
+        if close {
+            names.insert("}");
+        }
+    }
+    if names.contains("a number") && names.contains("(") {
+        words.push("an expression".to_owned());
+        names.retain(|name| !EXPRESSION.contains(name));
+    }
+    if names.contains("a name") {
+        // Words that may also be names.
+        names.retain(|name| !name.starts_with(|c: char| c.is_ascii_lowercase()) || name.contains(' '));
+    }
+    let operator = names.contains("**") || names.contains("*") || names.contains("and");
+    if operator {
+        // `~` goes on with an expression only at the start of a statement, where it is the likelier one.
+        let draw = names.contains("~");
+        names.retain(|name| !OPERATOR.contains(name) || (*name == "~" && draw));
+    }
+    let quoted = |name: &&str| if name.contains(' ') { (*name).to_owned() } else { format!("`{name}`") };
+    // What ends something is what is most often missing.
+    let (ends, others): (Vec<&str>, Vec<&str>) = names.iter().partition(|name| [";", ")", "]", "}"].contains(*name));
+    let mut all: Vec<String> = ends.iter().chain(&others).map(quoted).collect();
+    all.extend(words);
+    if operator {
+        all.push("an operator".to_owned());
+    }
+    match all.split_last() {
+        None => "the end of the text".to_owned(),
+        Some((last, [])) => last.clone(),
+        Some((last, before)) => format!("{} or {last}", before.join(", ")),
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    fn of(names: &[&str]) -> String {
+        describe(&names.iter().map(|n| format!("\"{n}\"")).collect::<Vec<_>>())
+    }
+
+    #[test]
+    fn lists_are_in_words() {
+        assert_eq!(of(&[";"]), "`;`");
+        assert_eq!(of(&[",", ")"]), "`)` or `,`");
+        assert_eq!(of(&EXPRESSION), "an expression");
+        assert_eq!(of(&[&OPERATOR[..], &[";", "a bad statement"]].concat()), "`;`, `~` or an operator");
+        assert_eq!(of(&["let", "for", "a number", "(", "}"]), "`}` or a statement");
+        assert_eq!(of(&["a name", "to", "when", "{"]), "`{` or a name");
+        assert_eq!(of(&[]), "the end of the text");
+    }
+}

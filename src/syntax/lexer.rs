@@ -1,0 +1,174 @@
+//! Text to tokens: drives logos, scans by hand what logos only opens, and reports what is no token.
+//!
+//! Every byte is consumed, also after errors, and what was meant is guessed (`&&` becomes `and`), so that the parser
+//! sees a likely program and the rest of the text is still checked. Spans are bytes of the whole text.
+
+use super::address;
+use super::error::{MAX_ERRORS, SyntaxError, SyntaxErrorKind};
+use super::span::{FileId, Span};
+use super::token::{Foreign, Open, Token, is_name};
+use logos::Logos;
+use std::ops::Range;
+
+/// The largest number of tokens accepted in a file.
+pub const MAX_TOKENS: usize = 1 << 20;
+
+/// A token and its bytes.
+#[derive(Clone, Debug)]
+pub(crate) struct Lexeme<'s> {
+    pub token: Token<'s>,
+    pub start: usize,
+    pub end: usize,
+}
+
+/// What the lexer is working on.
+pub(crate) struct Lexer<'s> {
+    /// The whole text of the file.
+    pub text: &'s str,
+    /// Where the part being lexed ends.
+    pub end: usize,
+    pub file: FileId,
+    /// How many addresses this text is inside of: keys may be expressions, which may hold addresses.
+    pub level: u32,
+    pub errors: Vec<SyntaxError>,
+}
+
+/// The tokens of `text[range]`, and the errors.
+pub(crate) fn lex(text: &str, range: Range<usize>, file: FileId, level: u32) -> (Vec<Lexeme<'_>>, Vec<SyntaxError>) {
+    let mut lexer = Lexer { text, end: range.end, file, level, errors: Vec::new() };
+    let mut lexemes = Vec::new();
+    let byte_order_mark = range.start == 0 && text.starts_with('\u{feff}');
+    let base = range.start + if byte_order_mark { '\u{feff}'.len_utf8() } else { 0 };
+    let mut logos = Token::lexer(&text[base..range.end]);
+    while let Some(found) = logos.next() {
+        let start = base + logos.span().start;
+        let mut end = base + logos.span().end;
+        let token = match found {
+            Ok(Token::Open(open)) => {
+                let token;
+                (token, end) = lexer.scan(open, start, end);
+                token
+            }
+            Ok(Token::Foreign(foreign)) => {
+                let token;
+                (token, end) = lexer.foreign(foreign, start, end);
+                token
+            }
+            Ok(Token::Number(x)) if x.is_infinite() => {
+                lexer.error(SyntaxErrorKind::NumberTooLarge, start, end);
+                Some(Token::Number(x))
+            }
+            Ok(token) => Some(token),
+            Err(()) => {
+                lexer.unknown(start, end);
+                None
+            }
+        };
+        logos.bump(end - base - logos.span().end);
+        lexemes.extend(token.map(|token| Lexeme { token, start, end }));
+        if lexemes.len() > MAX_TOKENS {
+            lexer.error(SyntaxErrorKind::TooManyTokens, start, end);
+            lexemes.clear();
+            break;
+        }
+        if lexer.errors.len() >= MAX_ERRORS {
+            // Not a program, or one that needs repair before more is said about it.
+            break;
+        }
+    }
+    (lexemes, lexer.errors)
+}
+
+impl<'s> Lexer<'s> {
+    pub fn error(&mut self, kind: SyntaxErrorKind, start: usize, end: usize) {
+        self.errors.push(SyntaxError::new(kind, Span::new(self.file, start, end)));
+    }
+
+    /// The text from a byte on.
+    pub fn rest(&self, at: usize) -> &'s str {
+        self.text.get(at..self.end).unwrap_or("")
+    }
+
+    /// The name that stands at a byte.
+    pub fn name(&self, at: usize) -> Option<&'s str> {
+        let rest = self.rest(at);
+        let length = rest.bytes().take_while(|b| b.is_ascii_alphanumeric() || *b == b'_').count();
+        Some(&rest[..length]).filter(|name| is_name(name))
+    }
+
+    /// Scans a lexeme that starts at `start` and is opened by the text up to `at`: the token and its end.
+    fn scan(&mut self, open: Open, start: usize, at: usize) -> (Option<Token<'s>>, usize) {
+        match open {
+            Open::Str => {
+                let (text, end) = self.string(start, at, &['"']);
+                (Some(Token::Str(text)), end)
+            }
+            Open::Comment => match self.rest(at).find("*/") {
+                Some(length) => (None, at + length + 2),
+                None => {
+                    self.error(SyntaxErrorKind::UnterminatedComment, start, at);
+                    (None, self.end)
+                }
+            },
+            Open::Address => {
+                let (address, end) = address::scan(self, start, at);
+                (Some(Token::Address(address)), end)
+            }
+            Open::TagSel => self.tag_selection(start, at),
+        }
+    }
+
+    /// Reports a spelling that is not of this language: the token that was meant, and its end.
+    fn foreign(&mut self, foreign: Foreign, start: usize, end: usize) -> (Option<Token<'s>>, usize) {
+        let text = &self.text[start..end];
+        let meant = match foreign {
+            Foreign::And => Token::And,
+            Foreign::Or | Foreign::Bar => Token::Or,
+            Foreign::Not => Token::Not,
+            Foreign::LeftArrow | Foreign::ColonEq | Foreign::Update => Token::Bind,
+            Foreign::EqEqEq => Token::EqEq,
+            Foreign::NotEqEq => Token::NotEq,
+            Foreign::Caret => Token::StarStar,
+            Foreign::Increment => Token::Plus,
+            Foreign::ColonColon => Token::Dot,
+            Foreign::Number => Token::Number(0.0),
+            Foreign::Name => Token::Name(text),
+            Foreign::RightArrow => {
+                self.error(SyntaxErrorKind::Foreign(foreign, text.into()), start, end);
+                return (None, end);
+            }
+            Foreign::Quote => return self.foreign_string(start, end),
+        };
+        self.error(SyntaxErrorKind::Foreign(foreign, text.into()), start, end);
+        (Some(meant), end)
+    }
+
+    /// A string in quotes that are none here, if it is closed on the same line.
+    fn foreign_string(&mut self, start: usize, at: usize) -> (Option<Token<'s>>, usize) {
+        let quote = &self.text[start..at];
+        let close: &[char] =
+            if quote == "'" { &['\''] } else { &['"', '“', '”', '„', '«', '»', '‘', '’', '`', '\''] };
+        let line = self.rest(at).split('\n').next().unwrap_or("");
+        if !line.contains(close) {
+            self.error(SyntaxErrorKind::Foreign(Foreign::Quote, quote.into()), start, at);
+            return (None, at);
+        }
+        let (value, end) = self.string(start, at, close);
+        self.error(SyntaxErrorKind::Foreign(Foreign::Quote, quote.into()), start, end);
+        (Some(Token::Str(value)), end)
+    }
+
+    /// Reports characters that begin no token; a run of them is one error.
+    fn unknown(&mut self, start: usize, end: usize) {
+        let text = &self.text[start..end];
+        if let Some(SyntaxError { kind: SyntaxErrorKind::UnknownCharacter(_), span }) = self.errors.last_mut()
+            && span.end as usize == start
+        {
+            span.end = end as u32;
+            return;
+        }
+        if let Some(c) = text.chars().next() {
+            self.error(SyntaxErrorKind::UnknownCharacter(c), start, end);
+        }
+    }
+}

@@ -1,0 +1,284 @@
+//! The register of active choices: by address, and by the selections kernels have asked for.
+//!
+//! Each selection keeps its members in a list, so that one of them is picked in constant time. The order is that of
+//! appearance, with the last member moving into the place of one that leaves: it is part of the trace's state.
+
+use super::demand::Failure;
+use super::graph::Graph;
+use super::journal::Entry;
+use super::node::*;
+use super::select::{Facts, Selector};
+use crate::dist::{Dist, Support};
+use crate::lang::address::Address;
+use crate::lang::code::{Code, Op};
+use crate::lang::error::FaultKind;
+use crate::lang::key::Key;
+use rustc_hash::FxHashMap;
+use std::sync::Arc;
+
+/// One thing a kernel can propose: a choice, or an element of one.
+#[derive(Clone, Copy, Debug, PartialEq, Eq, Hash, PartialOrd, Ord)]
+pub struct Target {
+    pub(crate) node: NodeId,
+    /// [`NONE`] for a whole choice.
+    pub(crate) element: u32,
+}
+
+/// The number of a registered selection in a trace.
+#[derive(Clone, Copy, Debug, PartialEq, Eq, Hash)]
+pub struct Selection(pub(crate) u32);
+
+#[derive(Clone, Debug)]
+pub(crate) struct Members {
+    selector: Selector,
+    pub targets: Vec<Target>,
+    place: FxHashMap<NodeId, u32>,
+}
+
+#[derive(Clone, Debug)]
+pub(crate) struct Choices {
+    by_address: FxHashMap<u64, NodeId>,
+    pub selections: Vec<Members>,
+    /// Addresses drawn while another choice had them: an error if that one is still there at the end.
+    suspects: Vec<(NodeId, NodeId)>,
+}
+
+impl Default for Choices {
+    fn default() -> Self {
+        let all = Members { selector: Selector::All, targets: Vec::new(), place: FxHashMap::default() };
+        Choices { by_address: FxHashMap::default(), selections: vec![all], suspects: Vec::new() }
+    }
+}
+
+impl Choices {
+    /// The choice at an address.
+    pub fn find(&self, hash: u64) -> Option<NodeId> {
+        self.by_address.get(&hash).copied()
+    }
+
+    pub fn forget_update(&mut self) {
+        self.suspects.clear();
+    }
+
+    pub fn undo_add(&mut self, n: NodeId, hash: u64) {
+        if self.by_address.get(&hash) == Some(&n) {
+            self.by_address.remove(&hash);
+        }
+    }
+
+    pub fn undo_remove(&mut self, n: NodeId, hash: u64) {
+        self.by_address.insert(hash, n);
+    }
+
+    pub fn undo_shadow(&mut self, hash: u64, n: NodeId) {
+        self.by_address.insert(hash, n);
+    }
+
+    pub fn undo_target(&mut self, selection: u32, at: u32, target: Target) {
+        let m = &mut self.selections[selection as usize];
+        let last = m.targets.len();
+        if at as usize == last {
+            m.targets.push(target);
+        } else {
+            let moved = std::mem::replace(&mut m.targets[at as usize], target);
+            m.targets.push(moved);
+            if moved.element == NONE {
+                m.place.insert(moved.node, last as u32);
+            }
+        }
+        m.place.insert(target.node, at);
+    }
+
+    pub fn undo_targets(&mut self, selection: u32, before: Vec<Target>) {
+        let m = &mut self.selections[selection as usize];
+        m.targets = before;
+        m.index();
+    }
+
+    pub fn undo_added(&mut self, selection: u32, count: u32) {
+        let m = &mut self.selections[selection as usize];
+        for _ in 0..count {
+            if let Some(t) = m.targets.pop() {
+                m.place.remove(&t.node);
+            }
+        }
+    }
+}
+
+impl Members {
+    fn index(&mut self) {
+        let whole = self.targets.iter().enumerate().filter(|(_, t)| t.element == NONE);
+        self.place = whole.map(|(i, t)| (t.node, i as u32)).collect();
+    }
+}
+
+impl Graph {
+    /// Registers a selection, or finds it if it is known.
+    pub fn selection(&mut self, code: &Code, selector: &Selector) -> Selection {
+        if let Some(i) = self.choices.selections.iter().position(|m| m.selector == *selector) {
+            return Selection(i as u32);
+        }
+        let mut members = Members { selector: selector.clone(), targets: Vec::new(), place: FxHashMap::default() };
+        for t in &self.choices.selections[0].targets {
+            let mut facts = self.facts(code, t.node, selector.needs_address(), None);
+            if t.element != NONE && selector.needs_address() {
+                push_key(&mut facts.address, t.element);
+            }
+            if selector.selects(&facts) {
+                members.targets.push(*t);
+            }
+        }
+        members.index();
+        self.choices.selections.push(members);
+        Selection(self.choices.selections.len() as u32 - 1)
+    }
+
+    /// What selections ask about a choice.
+    fn facts(&self, code: &Code, n: NodeId, with_address: bool, dist: Option<&Dist>) -> Facts {
+        let made = if dist.is_none() { self.dist_of(code, n) } else { None };
+        let dist = dist.or(made.as_ref());
+        let support = dist.map(Dist::stored_support);
+        Facts {
+            address: if with_address { self.address(code, n) } else { Address::default() },
+            tags: self.tags(code, n),
+            discrete: support.as_ref().is_some_and(Support::is_discrete),
+            finite: support.as_ref().is_some_and(Support::is_finite),
+            gaussian: dist.is_some_and(Dist::is_gaussian),
+        }
+    }
+
+    /// The distribution of a choice under the current values of its parameters.
+    pub fn dist_of(&self, code: &Code, n: NodeId) -> Option<Dist> {
+        let Op::Draw { dist, .. } = self.op(code, n) else { return None };
+        let frame = self.nodes[n as usize].frame;
+        self.make_dist(code, n, frame, dist, &mut Deps::new()).ok()
+    }
+
+    fn tags(&self, code: &Code, n: NodeId) -> Vec<(Arc<str>, Option<Key>)> {
+        let mut tags = Vec::new();
+        let mut node = n;
+        loop {
+            let frame = self.nodes[node as usize].frame;
+            let (Op::Draw { site, .. }
+            | Op::Call { site, .. }
+            | Op::Map { site, .. }
+            | Op::Fold { site, .. }
+            | Op::Mem { site, .. }) = self.op(code, node)
+            else {
+                let owner = self.frames[frame as usize].owner;
+                if owner == NONE {
+                    return tags;
+                }
+                node = owner;
+                continue;
+            };
+            for t in &code.sites[*site as usize].tags {
+                let value = t.value.and_then(|o| Key::from_value(self.value(code, frame, o)));
+                tags.push((Arc::clone(&code.tags[t.name as usize]), value));
+            }
+            match self.frames[frame as usize].owner {
+                NONE => return tags,
+                owner => node = owner,
+            }
+        }
+    }
+
+    /// Enters a new choice.
+    pub fn register_choice(
+        &mut self,
+        code: &Code,
+        n: NodeId,
+        hash: u64,
+        elements: Option<usize>,
+        dist: &Dist,
+    ) -> Result<(), Failure> {
+        if let Some(old) = self.choices.by_address.insert(hash, n)
+            && old != n
+        {
+            self.choices.suspects.push((old, n));
+            self.journal.push(Entry::AddressShadowed(hash, old));
+        }
+        self.journal.push(Entry::ChoiceAdded(n, hash));
+        let needs_facts = self.choices.selections.len() > 1;
+        let needs_address = self.choices.selections.iter().any(|m| m.selector.needs_address());
+        let mut facts = needs_facts.then(|| self.facts(code, n, needs_address, Some(dist)));
+        for i in 0..self.choices.selections.len() {
+            let mut count = 0;
+            for e in 0..elements.unwrap_or(1) {
+                let element = if elements.is_some() { e as u32 } else { NONE };
+                let selected = match &mut facts {
+                    None => true,
+                    Some(f) if element != NONE && needs_address => {
+                        push_key(&mut f.address, element);
+                        let yes = self.choices.selections[i].selector.selects(f);
+                        pop_key(&mut f.address);
+                        yes
+                    }
+                    Some(f) => self.choices.selections[i].selector.selects(f),
+                };
+                if selected {
+                    let m = &mut self.choices.selections[i];
+                    if element == NONE {
+                        m.place.insert(n, m.targets.len() as u32);
+                    }
+                    m.targets.push(Target { node: n, element });
+                    count += 1;
+                }
+            }
+            if count > 0 {
+                self.journal.push(Entry::TargetsAdded { selection: i as u32, count });
+            }
+        }
+        Ok(())
+    }
+
+    /// Removes a choice.
+    pub fn unregister_choice(&mut self, n: NodeId, hash: u64) {
+        if self.choices.by_address.get(&hash) == Some(&n) {
+            self.choices.by_address.remove(&hash);
+            self.journal.push(Entry::ChoiceRemoved(n, hash));
+        }
+        for i in 0..self.choices.selections.len() {
+            let m = &mut self.choices.selections[i];
+            if let Some(at) = m.place.remove(&n) {
+                let target = m.targets.swap_remove(at as usize);
+                if let Some(moved) = m.targets.get(at as usize)
+                    && moved.element == NONE
+                {
+                    m.place.insert(moved.node, at);
+                }
+                self.journal.push(Entry::TargetRemoved { selection: i as u32, at, target });
+            } else if m.targets.iter().any(|t| t.node == n) {
+                let before = m.targets.clone();
+                m.targets.retain(|t| t.node != n);
+                m.index();
+                self.journal.push(Entry::TargetsReplaced { selection: i as u32, before });
+            }
+        }
+    }
+
+    /// Two choices at one address are an error at the second.
+    pub fn check_duplicates(&mut self, code: &Code) -> Result<(), Failure> {
+        for (old, new) in std::mem::take(&mut self.choices.suspects) {
+            let alive = |n: NodeId| self.nodes[n as usize].state != State::Empty;
+            if alive(old) && alive(new) {
+                let message = format!("a second choice is drawn at {}", self.address(code, new));
+                let hint = Some("give each draw a name or key of its own".to_owned());
+                return Err(self.fail(code, new, FaultKind::Duplicate, message, hint));
+            }
+        }
+        Ok(())
+    }
+}
+
+pub(crate) fn push_key(address: &mut Address, element: u32) {
+    if let Some(last) = address.segments.last_mut() {
+        last.keys.push(Key::Num(f64::from(element).to_bits()));
+    }
+}
+
+fn pop_key(address: &mut Address) {
+    if let Some(last) = address.segments.last_mut() {
+        last.keys.pop();
+    }
+}

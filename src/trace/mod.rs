@@ -1,0 +1,385 @@
+//! Traces: one execution of a program as a dependency graph with dynamic structure.
+//!
+//! Everything is an operation on traces through one small interface: *propose* changes at addresses, get the weight of the
+//! incremental update, *commit* or *roll back*. A choice that no observation asks for is not part of a trace; it is drawn
+//! when a [`query`](Trace::query) asks for it, from its prior given the rest.
+
+mod choices;
+mod demand;
+mod eval;
+mod graph;
+mod journal;
+mod mark;
+mod node;
+mod path;
+mod propose;
+mod save;
+mod select;
+
+pub use crate::lang::address::{Address, AddressSegment};
+pub use choices::{Selection, Target};
+pub use graph::Limits;
+pub use propose::{Change, Constraint, Draws, Weight};
+pub use save::{SaveError, SavedTrace};
+pub use select::{ChoiceKind, Pattern, PatternSegment, Selector};
+
+use crate::dist::{Datum, Dist};
+use crate::lang::code::{Code, Op, Operand};
+use crate::lang::error::RunError;
+use crate::lang::value::Value;
+use graph::Graph;
+use journal::Before;
+use node::{NONE, State};
+use std::sync::Arc;
+
+/// One execution of a program: the values of its choices and all that follows from them.
+#[derive(Clone, Debug)]
+pub struct Trace {
+    code: Arc<Code>,
+    graph: Graph,
+    update: Option<Before>,
+}
+
+/// A failure of an operation on a trace; the trace is as it was before.
+pub type TraceResult<T> = Result<T, Box<RunError>>;
+
+impl Trace {
+    /// A trace in which nothing has run: queries draw from the prior, observations are ignored.
+    pub fn prior(code: Arc<Code>, limits: Limits) -> Self {
+        let graph = Graph::new(&code, limits);
+        Trace { code, graph, update: None }
+    }
+
+    /// Runs a program: draws what its observations ask for.
+    ///
+    /// # Errors
+    /// What the program does wrong, with its place.
+    pub fn simulate(code: Arc<Code>, draws: Draws, limits: Limits) -> TraceResult<Self> {
+        Trace::generate(code, std::iter::empty(), draws, limits).map(|(t, _)| t)
+    }
+
+    /// Runs a program with the values of some choices given. The weight is the log joint less the log density of what was
+    /// drawn: the importance weight of the trace.
+    ///
+    /// # Errors
+    /// What the program does wrong, with its place.
+    pub fn generate(
+        code: Arc<Code>,
+        constraints: impl IntoIterator<Item = (u64, Constraint)>,
+        draws: Draws,
+        limits: Limits,
+    ) -> TraceResult<(Self, Weight)> {
+        let mut trace = Trace::prior(code, limits);
+        let g = &mut trace.graph;
+        g.constraints = constraints.into_iter().collect();
+        g.draws = draws;
+        let before = g.begin();
+        let effects = &trace.code.blocks[0].effects;
+        for s in effects {
+            g.nodes[*s as usize].refs = 1;
+        }
+        g.effects.extend(effects);
+        g.settle(&trace.code)?;
+        let weight = g.weight(&before.prior, &before.likelihood);
+        g.commit(&trace.code);
+        g.constraints.clear();
+        Ok((trace, weight))
+    }
+
+    /// The program.
+    pub fn code(&self) -> &Arc<Code> {
+        &self.code
+    }
+
+    /// Proposes changes and updates what depends on them. The update is pending until [`Trace::commit`] or
+    /// [`Trace::rollback`]; a second proposal rolls the first back.
+    ///
+    /// # Errors
+    /// What goes wrong under the proposed values; the trace is then as before.
+    pub fn propose(&mut self, changes: &[(Target, Change)], draws: Draws) -> TraceResult<Weight> {
+        self.propose_constrained(changes, &[], draws)
+    }
+
+    /// The same, with the values that some choices take if they appear.
+    ///
+    /// # Errors
+    /// As [`Trace::propose`].
+    pub fn propose_constrained(
+        &mut self,
+        changes: &[(Target, Change)],
+        constraints: &[(u64, Constraint)],
+        draws: Draws,
+    ) -> TraceResult<Weight> {
+        self.rollback();
+        let before = self.graph.begin();
+        self.graph.draws = draws;
+        self.graph.constraints.extend(constraints.iter().cloned());
+        self.graph.queue(&self.code, changes);
+        let settled = self.graph.settle(&self.code);
+        self.graph.constraints.clear();
+        match settled {
+            Ok(()) => {
+                let weight = self.graph.weight(&before.prior, &before.likelihood);
+                self.update = Some(before);
+                Ok(weight)
+            }
+            Err(e) => {
+                self.graph.rollback(&self.code, before);
+                Err(e)
+            }
+        }
+    }
+
+    /// Draws the targets anew from the prior, together.
+    ///
+    /// # Errors
+    /// As [`Trace::propose`].
+    pub fn regenerate(&mut self, targets: &[Target], draws: Draws) -> TraceResult<Weight> {
+        let changes: Vec<_> = targets.iter().map(|t| (*t, Change::Resample)).collect();
+        self.propose(&changes, draws)
+    }
+
+    /// The choices that vanish in the pending proposal, with the values they had.
+    pub fn removed(&self) -> Vec<(u64, Constraint)> {
+        self.graph.removed.iter().map(|(h, d)| (*h, Constraint::Stored(d.clone()))).collect()
+    }
+
+    /// Keeps the pending proposal, if there is one.
+    pub fn commit(&mut self) {
+        if self.update.take().is_some() {
+            self.graph.commit(&self.code);
+        }
+    }
+
+    /// Undoes the pending proposal, if there is one.
+    pub fn rollback(&mut self) {
+        if let Some(before) = self.update.take() {
+            self.graph.rollback(&self.code, before);
+        }
+    }
+
+    /// The log joint density of choices, observations and factors.
+    pub fn log_joint(&self) -> f64 {
+        self.graph.log_joint()
+    }
+
+    /// Its prior part: the choices.
+    pub fn log_prior(&self) -> f64 {
+        self.graph.prior.value()
+    }
+
+    /// Its observed part: observations and factors.
+    pub fn log_likelihood(&self) -> f64 {
+        self.graph.likelihood.value()
+    }
+
+    /// The log density of what a selection selects: its share of the log prior.
+    pub fn score(&mut self, selector: &Selector) -> f64 {
+        let selection = self.select(selector);
+        let mut sum = crate::num::ExactSum::default();
+        for t in self.targets(selection).to_vec() {
+            sum.add(self.target_score(t));
+        }
+        sum.value()
+    }
+
+    fn target_score(&self, t: Target) -> f64 {
+        let node = &self.graph.nodes[t.node as usize];
+        match node.side.as_deref() {
+            Some(node::Side::Choice(c)) if t.element != NONE => c.scores[t.element as usize],
+            _ => node.score,
+        }
+    }
+
+    /// Registers a selection; its members are kept up to date from then on.
+    pub fn select(&mut self, selector: &Selector) -> Selection {
+        self.rollback();
+        self.graph.selection(&self.code, selector)
+    }
+
+    /// The choices a selection now has.
+    pub fn targets(&self, selection: Selection) -> &[Target] {
+        &self.graph.choices.selections[selection.0 as usize].targets
+    }
+
+    /// The choice at an address, if it is active. An element of a choice has the element's index as last key.
+    pub fn find(&self, address: &Address) -> Option<Target> {
+        if let Some(n) = self.graph.choices.find(address.hash64()) {
+            return Some(Target { node: n, element: NONE });
+        }
+        let mut whole = address.clone();
+        let key = whole.segments.last_mut()?.keys.pop()?;
+        let n = self.graph.choices.find(whole.hash64())?;
+        let elements = match self.graph.nodes[n as usize].side.as_deref() {
+            Some(node::Side::Choice(c)) if c.elements != NONE => c.elements,
+            _ => return None,
+        };
+        let element = key.as_index().filter(|i| *i < elements as usize)?;
+        Some(Target { node: n, element: element as u32 })
+    }
+
+    /// The address of a choice.
+    pub fn address(&self, t: Target) -> Address {
+        let mut a = self.graph.address(&self.code, t.node);
+        if t.element != NONE {
+            choices::push_key(&mut a, t.element);
+        }
+        a
+    }
+
+    /// A hash of the address of a choice, stable between runs.
+    pub fn address_hash(&self, t: Target) -> u64 {
+        let h = self.graph.choice_hash(&self.code, t.node);
+        if t.element == NONE { h } else { eval::choice::element_hash(h, t.element as usize) }
+    }
+
+    /// The value of a choice as the program sees it.
+    pub fn value(&self, t: Target) -> Value {
+        let v = &self.graph.nodes[t.node as usize].value;
+        if t.element == NONE { v.clone() } else { v.element(t.element as usize).unwrap_or_default() }
+    }
+
+    /// The value of a choice in stored form.
+    pub fn stored(&self, t: Target) -> Option<Datum> {
+        if t.element == NONE { self.graph.stored(t.node) } else { self.value(t).to_datum() }
+    }
+
+    /// The distribution a choice now has.
+    pub fn dist(&self, t: Target) -> Option<Dist> {
+        let d = self.graph.dist_of(&self.code, t.node)?;
+        Some(if t.element == NONE { d } else { d.element(t.element as usize) })
+    }
+
+    /// Whether a choice is an array of separately addressed elements.
+    pub fn elements(&self, t: Target) -> Option<usize> {
+        match self.graph.nodes[t.node as usize].side.as_deref() {
+            Some(node::Side::Choice(c)) if c.elements != NONE && t.element == NONE => Some(c.elements as usize),
+            _ => None,
+        }
+    }
+
+    /// How many choices (elements counted one by one) are active.
+    pub fn choice_count(&self) -> usize {
+        self.graph.choices.selections[0].targets.len()
+    }
+
+    /// The values of expressions of the top level; what they need and no observation asks for is drawn from its prior
+    /// given the rest, and forgotten again.
+    ///
+    /// # Errors
+    /// What goes wrong while they are evaluated.
+    pub fn query(&mut self, operands: &[Operand], draws: Draws) -> TraceResult<Vec<Value>> {
+        self.rollback();
+        let before = self.graph.begin();
+        self.graph.draws = draws;
+        self.graph.before = Some(before.clone());
+        let result = self.graph.query(&self.code, operands);
+        self.graph.before = None;
+        self.graph.rollback(&self.code, before);
+        result
+    }
+
+    /// The value of a top-level name.
+    ///
+    /// # Errors
+    /// As [`Trace::query`]; `None` if there is no such name.
+    pub fn global(&mut self, name: &str, draws: Draws) -> Option<TraceResult<Value>> {
+        let operand = *self.code.globals.get(name)?;
+        Some(self.query(&[operand], draws).map(|mut v| v.swap_remove(0)))
+    }
+
+    /// The log density of the coarse surrogate of an observation (`with coarse = …`), by the address it has. It is never
+    /// part of the joint.
+    ///
+    /// # Errors
+    /// What goes wrong while it is evaluated; `None` if there is no such observation or it has no surrogate.
+    pub fn surrogate(&mut self, address: &Address, draws: Draws) -> TraceResult<Option<f64>> {
+        let Some((n, _)) = self.scored().into_iter().find(|(n, _)| self.graph.address(&self.code, *n) == *address)
+        else {
+            return Ok(None);
+        };
+        self.rollback();
+        let before = self.graph.begin();
+        self.graph.draws = draws;
+        let result = self.graph.surrogate_score(&self.code, n);
+        self.graph.rollback(&self.code, before);
+        result
+    }
+
+    /// Every observation and factor with its log density, in the order of the program's blocks.
+    pub fn observations(&self) -> Vec<(Address, f64)> {
+        self.scored().into_iter().map(|(n, s)| (self.graph.address(&self.code, n), s)).collect()
+    }
+
+    fn scored(&self) -> Vec<(u32, f64)> {
+        let nodes = self.graph.nodes.iter().enumerate().filter(|(_, n)| n.state == State::Clean);
+        nodes
+            .filter(|(i, _)| matches!(self.graph.op(&self.code, *i as u32), Op::Observe { .. } | Op::Factor { .. }))
+            .map(|(i, n)| {
+                let score = match n.side.as_deref() {
+                    Some(node::Side::Total(t)) if n.score == 0.0 => t.sum.value(),
+                    _ => n.score,
+                };
+                (i as u32, score)
+            })
+            .collect()
+    }
+
+    /// Every active choice with its address and log density, by address.
+    pub fn choices(&self) -> Vec<(Address, Value, f64)> {
+        let targets = &self.graph.choices.selections[0].targets;
+        let mut all: Vec<_> = targets.iter().map(|t| (self.address(*t), self.value(*t), self.target_score(*t))).collect();
+        all.sort_by(|a, b| a.0.cmp(&b.0));
+        all
+    }
+
+    /// Turns incremental updates off (every proposal re-runs the whole program) or on again; chains are the same either way.
+    pub fn set_incremental(&mut self, on: bool) {
+        self.graph.incremental = on;
+    }
+
+    /// Starts to note which operations are executed.
+    pub fn watch(&mut self) {
+        self.graph.watched = Some(Vec::new());
+    }
+
+    /// What was executed since [`Trace::watch`]: the text of each expression, where the source is at hand by its span.
+    pub fn executed(&mut self) -> Vec<crate::syntax::span::Span> {
+        let log = self.graph.watched.take().unwrap_or_default();
+        log.into_iter().map(|(b, s)| self.code.blocks[b as usize].spans[s as usize]).collect()
+    }
+
+    /// Runs the program again from scratch with the same choices: a check that increments and structure are right.
+    ///
+    /// # Errors
+    /// What the program does wrong.
+    pub fn rerun(&self) -> TraceResult<Trace> {
+        let saved = self.constraints();
+        Trace::generate(Arc::clone(&self.code), saved, Draws::default(), self.graph.limits).map(|(t, _)| t)
+    }
+
+    /// The choices as constraints for [`Trace::generate`].
+    pub fn constraints(&self) -> Vec<(u64, Constraint)> {
+        let targets = &self.graph.choices.selections[0].targets;
+        let stored = targets.iter().filter_map(|t| self.stored(*t).map(|d| (self.address_hash(*t), d)));
+        stored.map(|(h, d)| (h, Constraint::Stored(d))).collect()
+    }
+}
+
+impl Graph {
+    fn query(&mut self, code: &Code, operands: &[Operand]) -> TraceResult<Vec<Value>> {
+        let mut values = Vec::with_capacity(operands.len());
+        for o in operands {
+            if let Some(n) = self.resolve(0, *o) {
+                self.demand(code, n)?;
+            }
+            if let Value::Container(r) = self.value(code, 0, *o) {
+                let gather = r.node + 1;
+                self.demand(code, gather)?;
+            }
+            let mut deps = node::Deps::new();
+            values.push(self.plain(code, 0, *o, &mut deps).clone());
+        }
+        Ok(values)
+    }
+}

@@ -1,0 +1,148 @@
+//! The vocabulary of updates: changes, their random streams, and what an update did to the score.
+
+use super::choices::Target;
+use super::graph::Graph;
+use super::node::*;
+use crate::dist::Datum;
+use crate::num::ExactSum;
+use crate::rng::{Stream, StreamKey};
+
+/// Where the random numbers of an update come from: one stream for each address, whatever the order of evaluation.
+#[derive(Clone, Copy, Debug, Default)]
+pub struct Draws {
+    /// Seed, chain and purpose.
+    pub key: StreamKey,
+    /// The step of the chain.
+    pub step: u64,
+    /// Which of several alternatives at one step.
+    pub lane: u64,
+}
+
+impl Draws {
+    /// The stream of an address.
+    pub(crate) fn stream(&self, address_hash: u64) -> Stream {
+        self.key.stream(self.step, address_hash, self.lane)
+    }
+}
+
+/// What happens to one choice in an update.
+#[derive(Clone, Debug, PartialEq)]
+pub enum Change {
+    /// It takes this value, in stored form (for a whitened gp: the white noise behind it).
+    Set(Datum),
+    /// It is drawn anew from its prior, as that is after the update.
+    Resample,
+    /// It becomes the image of this point of the unconstrained space under its support, as that is after the update; the
+    /// log Jacobian goes to [`Weight::log_jacobian`].
+    Free(Vec<f64>),
+    /// It becomes the image of this white noise under its Gaussian prior, as that is after the update.
+    White(Vec<f64>),
+}
+
+/// A change waiting to be applied.
+#[derive(Clone, Debug)]
+pub(crate) struct Pending {
+    pub node: NodeId,
+    pub element: u32,
+    pub change: Change,
+}
+
+/// A value that a choice takes when it is first drawn.
+#[derive(Clone, Debug, PartialEq)]
+pub enum Constraint {
+    /// In stored form, as saved traces keep it.
+    Stored(Datum),
+    /// As the program sees it.
+    Value(Datum),
+}
+
+/// What an update did to the score. Differences are taken between exact sums, so that they do not depend on the order in
+/// which terms changed.
+#[derive(Clone, Copy, Debug, PartialEq)]
+pub struct Weight {
+    /// The change of the log joint density, less what was drawn from the prior, plus what an update back would draw from
+    /// it: the log acceptance ratio but for the proposal terms of [`Change::Set`].
+    pub log_weight: f64,
+    /// The change of the log joint density.
+    pub log_joint: f64,
+    /// The change of the log density of observations and factors.
+    pub log_likelihood: f64,
+    /// The sum of the log Jacobians of [`Change::Free`].
+    pub log_jacobian: f64,
+    /// How many choices appeared and vanished.
+    pub appeared: u32,
+    /// See `appeared`.
+    pub vanished: u32,
+}
+
+impl Graph {
+    /// The pending changes of a choice.
+    pub fn pending_of(&self, n: NodeId) -> impl Iterator<Item = &Pending> {
+        let first = self.pending.partition_point(|p| p.node < n);
+        self.pending[first..].iter().take_while(move |p| p.node == n)
+    }
+
+    /// Queues changes and marks what they reach.
+    pub fn queue(&mut self, code: &crate::lang::code::Code, changes: &[(Target, Change)]) {
+        self.pending.extend(changes.iter().map(|(t, c)| Pending {
+            node: t.node,
+            element: t.element,
+            change: c.clone(),
+        }));
+        self.pending.sort_by_key(|p| p.node);
+        if !self.incremental {
+            self.mark_everything(code);
+        }
+        for (t, _) in changes {
+            self.save(t.node);
+            if self.nodes[t.node as usize].flags & TARGET == 0 {
+                self.nodes[t.node as usize].flags |= TARGET;
+                self.mark_target(code, t.node);
+            }
+        }
+    }
+
+    /// What the current update did to the score.
+    pub fn weight(&self, prior: &ExactSum, likelihood: &ExactSum) -> Weight {
+        let mut old = prior.clone();
+        old.merge(likelihood);
+        let mut new = self.prior.clone();
+        new.merge(&self.likelihood);
+        let log_joint = ExactSum::difference(&new, &old);
+        new.unmerge(&self.drawn);
+        old.unmerge(&self.undrawn);
+        Weight {
+            log_weight: ExactSum::difference(&new, &old),
+            log_joint,
+            log_likelihood: ExactSum::difference(&self.likelihood, likelihood),
+            log_jacobian: self.jacobian,
+            appeared: self.appeared,
+            vanished: self.vanished,
+        }
+    }
+
+    /// The log joint density.
+    pub fn log_joint(&self) -> f64 {
+        let mut sum = self.prior.clone();
+        sum.merge(&self.likelihood);
+        sum.value()
+    }
+
+    /// A property of the whole trace.
+    pub fn probe(&self, p: crate::lang::code::Probe) -> f64 {
+        use crate::lang::code::Probe;
+        let (prior, likelihood) = match &self.before {
+            Some(b) => (&b.prior, &b.likelihood),
+            None => (&self.prior, &self.likelihood),
+        };
+        match p {
+            Probe::LogPrior => prior.value(),
+            Probe::LogLikelihood => likelihood.value(),
+            Probe::LogJoint => {
+                let mut sum = prior.clone();
+                sum.merge(likelihood);
+                sum.value()
+            }
+        }
+    }
+}

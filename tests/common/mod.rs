@@ -1,0 +1,62 @@
+//! Running programs given as text, and judging their draws.
+#![allow(dead_code)]
+
+use pcadlang::Model;
+use pcadlang::infer::RunOptions;
+use std::collections::BTreeMap;
+
+/// Draws by column, all chains one after the other.
+pub type Draws = BTreeMap<String, Vec<f64>>;
+
+/// Runs a program and gives its draws.
+pub fn run(text: &str, seed: u64, chains: usize) -> Draws {
+    run_with(text, &RunOptions { seed, ..RunOptions::default() }, chains, 2)
+}
+
+/// The same with options.
+pub fn run_with(text: &str, options: &RunOptions, chains: usize, threads: usize) -> Draws {
+    let model = Model::from_text(text).unwrap_or_else(|e| panic!("{e}"));
+    let posterior = model.run(options, chains, threads).unwrap_or_else(|e| panic!("{e}"));
+    let mut draws = Draws::new();
+    for (name, values) in posterior.scalars() {
+        draws.entry(name).or_default().extend(values);
+    }
+    draws
+}
+
+pub fn mean(xs: &[f64]) -> f64 {
+    xs.iter().sum::<f64>() / xs.len() as f64
+}
+
+pub fn variance(xs: &[f64]) -> f64 {
+    let m = mean(xs);
+    xs.iter().map(|x| (x - m) * (x - m)).sum::<f64>() / (xs.len() as f64 - 1.0)
+}
+
+/// The Monte Carlo standard error of the mean by batch means: honest for correlated draws.
+pub fn standard_error(xs: &[f64]) -> f64 {
+    let batches = 40;
+    let size = xs.len() / batches;
+    let means: Vec<f64> = (0..batches).map(|b| mean(&xs[b * size..(b + 1) * size])).collect();
+    (variance(&means) / batches as f64).sqrt()
+}
+
+/// Asserts that a posterior mean is right within 5 standard errors (batch means of 40 batches: a false alarm has a chance
+/// of about 1e-5), and that the error is small enough for the test to mean something.
+pub fn assert_mean(what: &str, xs: &[f64], expected: f64, tolerance: f64) {
+    let (m, se) = (mean(xs), standard_error(xs));
+    assert!(5.0 * se < tolerance, "{what}: the standard error {se} is too large to tell {tolerance}; run longer");
+    assert!((m - expected).abs() < 5.0 * se + 1e-12, "{what}: mean {m} (se {se}), expected {expected}");
+}
+
+/// Integrates f over a..b by Simpson's rule with n (even) intervals.
+pub fn integrate(f: impl Fn(f64) -> f64, a: f64, b: f64, n: usize) -> f64 {
+    let h = (b - a) / n as f64;
+    let inner: f64 = (1..n).map(|i| f(a + i as f64 * h) * if i % 2 == 1 { 4.0 } else { 2.0 }).sum();
+    (f(a) + inner + f(b)) * h / 3.0
+}
+
+pub fn normal_pdf(x: f64, m: f64, sd: f64) -> f64 {
+    let z = (x - m) / sd;
+    (-0.5 * z * z).exp() / (sd * (2.0 * std::f64::consts::PI).sqrt())
+}

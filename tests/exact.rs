@@ -1,0 +1,284 @@
+//! Kernels against exact answers: conjugate, enumerable, recursive, changing-structure and open-universe models.
+
+mod common;
+use common::*;
+
+/// x ~ normal(0, 1), observe normal(x, 0.5) = 2: mean 1.600, variance 0.200. (Leaving the prior out of the ratio, as an
+/// early engine did, gives 1.333 and 0.167.)
+fn conjugate_normal(kernel: &str) {
+    let text = format!(
+        "assume x ~ normal(0, 1); observe normal(x, 0.5) = 2;
+         infer {{ warmup 2000 {{ {kernel}; }} repeat 60000 {{ {kernel}; collect x; }} }}"
+    );
+    let d = run(&text, 1, 2);
+    assert_mean(kernel, &d["x"], 1.6, 0.06);
+    let squares: Vec<f64> = d["x"].iter().map(|x| (x - 1.6) * (x - 1.6)).collect();
+    assert_mean(&format!("{kernel}, variance"), &squares, 0.2, 0.03);
+}
+
+#[test]
+fn conjugate_normal_by_mh() {
+    conjugate_normal("mh(one(@**))");
+}
+
+#[test]
+fn conjugate_normal_by_block() {
+    conjugate_normal("block(@**)");
+}
+
+#[test]
+fn conjugate_normal_by_drift() {
+    conjugate_normal("drift(@x)");
+}
+
+#[test]
+fn conjugate_normal_by_elliptical() {
+    conjugate_normal("elliptical(@x)");
+}
+
+#[test]
+fn conjugate_normal_by_a_mixture_of_kernels() {
+    conjugate_normal("mix { 0.3 => mh(@x); 0.3 => drift(@x); 0.4 => elliptical(@x); }".trim_end_matches(';'));
+}
+
+/// The default plan, nothing collected by hand.
+#[test]
+fn conjugate_normal_by_the_default_plan() {
+    let d = run("assume x ~ normal(0, 1); observe normal(x, 0.5) = 2;", 3, 8);
+    assert_mean("default plan", &d["x"], 1.6, 0.1);
+}
+
+#[test]
+fn beta_binomial() {
+    for kernel in ["mh(@p)", "drift(@p)"] {
+        let text = format!(
+            "assume p ~ beta(1, 1); observe binomial(20, p) = 14;
+             infer {{ warmup 1000 {{ {kernel}; }} repeat 40000 {{ {kernel}; collect p; }} }}"
+        );
+        assert_mean(kernel, &run(&text, 5, 2)["p"], 15.0 / 22.0, 0.02);
+    }
+}
+
+/// The support of p2 depends on p1: p1 ~ uniform(.5, 1), p2 ~ uniform(0, p1), observe flip(p2) = false.
+#[test]
+fn support_that_depends_on_another_choice() {
+    let z = integrate(|p1| 1.0 - p1 / 2.0, 0.5, 1.0, 200);
+    let m1 = integrate(|p1| p1 * (1.0 - p1 / 2.0), 0.5, 1.0, 200) / z;
+    let m2 = integrate(|p1| p1 / 2.0 - p1 * p1 / 3.0, 0.5, 1.0, 200) / z;
+    for kernel in ["mh(one(@**))", "block(@**)", "drift(@**)", "drift(one(@**))"] {
+        let text = format!(
+            "assume p1 ~ uniform(0.5, 1); assume p2 ~ uniform(0, p1); observe flip(p2) = false;
+             infer {{ warmup 2000 {{ {kernel}; }} repeat 60000 {{ {kernel}; collect p1, p2; }} }}"
+        );
+        let d = run(&text, 7, 2);
+        assert_mean(&format!("{kernel}: p1"), &d["p1"], m1, 0.02);
+        assert_mean(&format!("{kernel}: p2"), &d["p2"], m2, 0.03);
+    }
+}
+
+/// Geometric recursion: two calls, unbounded numbers of choices.
+#[test]
+fn recursion_against_enumeration() {
+    let weight = |a: f64| (a + 1.0) * 0.25 * 0.5f64.powf(a) * normal_pdf(3.0, a, 0.8);
+    let z: f64 = (0..60).map(|a| weight(f64::from(a))).sum();
+    let expected = (0..60).map(|a| f64::from(a) * weight(f64::from(a))).sum::<f64>() / z;
+    for kernel in ["mh(one(@**))", "gibbs(one(@**))", "block(@**)", "drift(one(@**))", "mh(one(@a/geom#2))"] {
+        let kernel = if kernel.contains('#') { "mix { 0.5 => mh(one(@a/geom#2)); 0.5 => mh(one(@a/geom)); }" } else { kernel };
+        let k = if kernel.starts_with("mix") { kernel.to_owned() } else { format!("{kernel};") };
+        let text = format!(
+            "fn geom(p) {{ s ~ flip(p); if s {{ 1 + geom(p) }} else {{ 0 }} }}
+             assume a = geom(0.5) + geom(0.5); observe normal(a, 0.8) = 3;
+             infer {{ repeat 60000 {{ {k} collect a; }} }}"
+        );
+        let d = run(&text, 11, 2);
+        if !kernel.starts_with("mix") {
+            assert_mean(kernel, &d["a"], expected, 0.15);
+        }
+    }
+}
+
+/// Which choices exist depends on a choice, and both branches draw at the same address.
+#[test]
+fn branches_with_choices_of_their_own() {
+    let w1 = 0.3 * normal_pdf(3.0, 0.0, 2f64.sqrt());
+    let w2 = 0.7 * normal_pdf(3.0, 5.0, 5f64.sqrt());
+    let p = w1 / (w1 + w2);
+    let mean_x = p * 1.5 + (1.0 - p) * (5.0 + 4.0 / 5.0 * (3.0 - 5.0));
+    for kernel in ["mh(one(@**));", "gibbs(@c); drift(@x);", "block(@**);", "mh(@c); elliptical(one($gaussian));"] {
+        let text = format!(
+            "assume c ~ flip(0.3);
+             assume x = if c {{ a ~ normal(0, 1); a }} else {{ a ~ normal(5, 2); a }};
+             observe normal(x, 1) = 3;
+             infer {{ warmup 500 {{ {kernel} }} repeat 60000 {{ {kernel} collect c, x; }} }}"
+        );
+        let d = run(&text, 13, 2);
+        assert_mean(&format!("{kernel} c"), &d["c"], p, 0.03);
+        assert_mean(&format!("{kernel} x"), &d["x"], mean_x, 0.15);
+    }
+}
+
+/// A hidden Markov chain by a loop that reads its own container, against forward-backward.
+#[test]
+fn hidden_markov_model() {
+    let obs = [0.2, 1.1, 2.3, 1.9, 0.4];
+    let trans = [[0.8, 0.15, 0.05], [0.2, 0.6, 0.2], [0.1, 0.3, 0.6]];
+    let like = |s: usize, y: f64| normal_pdf(y, s as f64, 0.7);
+    let n = obs.len();
+    let mut forward = vec![[0.0; 3]; n];
+    for s in 0..3 {
+        forward[0][s] = like(s, obs[0]) / 3.0;
+    }
+    for t in 1..n {
+        for s in 0..3 {
+            forward[t][s] = (0..3).map(|r| forward[t - 1][r] * trans[r][s]).sum::<f64>() * like(s, obs[t]);
+        }
+    }
+    let mut backward = vec![[1.0; 3]; n];
+    for t in (0..n - 1).rev() {
+        for r in 0..3 {
+            backward[t][r] = (0..3).map(|s| trans[r][s] * like(s, obs[t + 1]) * backward[t + 1][s]).sum();
+        }
+    }
+    let exact: Vec<f64> = (0..n)
+        .map(|t| {
+            let z: f64 = (0..3).map(|s| forward[t][s] * backward[t][s]).sum();
+            (0..3).map(|s| s as f64 * forward[t][s] * backward[t][s]).sum::<f64>() / z
+        })
+        .collect();
+    for kernel in ["gibbs(one(@s))", "mh(one(@s))", "drift(one(@s))"] {
+        let text = format!(
+            "let y = [0.2, 1.1, 2.3, 1.9, 0.4];
+             let trans = [[0.8, 0.15, 0.05], [0.2, 0.6, 0.2], [0.1, 0.3, 0.6]];
+             for t in 0 .. 5 {{
+               s[t] ~ categorical(if t == 0 {{ [1, 1, 1] }} else {{ trans[s[t - 1]] }});
+               observe normal(s[t], 0.7) = y[t];
+             }}
+             infer {{ repeat 80000 {{ {kernel}; collect s; }} }}"
+        );
+        let d = run(&text, 17, 2);
+        for (t, e) in exact.iter().enumerate() {
+            assert_mean(&format!("{kernel} s[{t}]"), &d[&format!("s.{}", t + 1)], *e, 0.1);
+        }
+    }
+}
+
+/// Partitions of three points under a Dirichlet process by stick-breaking and mem, against the five partitions.
+#[test]
+fn open_universe_with_mem() {
+    let y = [-1.0, -0.5, 2.0];
+    // Marginal density of a group: points given a centre ~ normal(0, 2), noise 1.
+    let group = |points: &[f64]| {
+        integrate(|m| normal_pdf(m, 0.0, 2.0) * points.iter().map(|p| normal_pdf(*p, m, 1.0)).product::<f64>(), -15.0, 15.0, 3000)
+    };
+    // Chinese restaurant process with alpha = 1 over 3 points: n! denominators.
+    let together = group(&y) * 2.0 / 6.0;
+    let first_two = group(&y[..2]) * group(&y[2..]) / 6.0;
+    let outer = group(&[y[0], y[2]]) * group(&y[1..2]) / 6.0;
+    let last_two = group(&y[1..]) * group(&y[..1]) / 6.0;
+    let apart = group(&y[..1]) * group(&y[1..2]) * group(&y[2..]) / 6.0;
+    let z = together + first_two + outer + last_two + apart;
+    let p01 = (together + first_two) / z;
+    let p12 = (together + last_two) / z;
+    for kernel in ["mh(one($discrete)); drift(one($continuous));", "gibbs(one($discrete)); mh(one($continuous)); mh(one($discrete));"] {
+        let text = format!(
+            "let y = [-1, -0.5, 2];
+             assume stick = mem(fn(k) {{ v ~ beta(1, 1); v }});
+             assume centre = mem(fn(k) {{ m ~ normal(0, 2); m }});
+             fn pick(k) {{ here ~ flip(stick(k)); if here {{ k }} else {{ pick(k + 1) }} }}
+             assume z = map(fn(i) {{ pick(0) }}, 0 .. 3);
+             for i in 0 .. 3 {{ observe normal(centre(z[i]), 1) = y[i]; }}
+             infer {{ warmup 1000 {{ {kernel} }} repeat 150000 {{ {kernel} collect z[0] == z[1], z[1] == z[2]; }} }}"
+        );
+        let d = run(&text, 19, 2);
+        assert_mean(&format!("{kernel} together 0 1"), &d["z[0] == z[1]"], p01, 0.05);
+        assert_mean(&format!("{kernel} together 1 2"), &d["z[1] == z[2]"], p12, 0.05);
+    }
+}
+
+/// Elliptical slice with a non-zero mean and full covariance, and a mean that depends on a choice of the block.
+#[test]
+fn elliptical_slice_with_full_covariance() {
+    // Prior N([1, -1], [[2, .9], [.9, 1]]), observe x0 + x1 = 1.5 with sd 0.5.
+    let (s00, s01, s11) = (2.0, 0.9, 1.0);
+    let v = s00 + 2.0 * s01 + s11 + 0.25;
+    let gain = [(s00 + s01) / v, (s01 + s11) / v];
+    let expected = [1.0 + gain[0] * 1.5, -1.0 + gain[1] * 1.5];
+    let d = run(
+        "assume x ~ mv_normal([1, -1], [[2, 0.9], [0.9, 1]]);
+         observe normal(x[0] + x[1], 0.5) = 1.5;
+         infer { repeat 40000 { elliptical(@x); collect x; } }",
+        23,
+        2,
+    );
+    assert_mean("x0", &d["x.1"], expected[0], 0.05);
+    assert_mean("x1", &d["x.2"], expected[1], 0.05);
+    // a ~ N(0,1), b ~ N(a,1), observe N(b, .5) = 2: b ~ N(0, 2) a priori.
+    let d = run(
+        "assume a ~ normal(0, 1); assume b ~ normal(a, 1); observe normal(b, 0.5) = 2;
+         infer { repeat 40000 { elliptical(@a + @b); collect a, b; } }",
+        29,
+        2,
+    );
+    assert_mean("b", &d["b"], 2.0 * 2.0 / 2.25, 0.05);
+    assert_mean("a", &d["a"], 2.0 / 2.25, 0.05);
+}
+
+/// A gp over five points, its bandwidth unknown: whitened and centred forms agree with quadrature over the bandwidth.
+#[test]
+fn gaussian_process_with_unknown_bandwidth() {
+    let text = |centred: bool, kernel: &str| {
+        format!(
+            "assume l ~ uniform(0.2, 2);
+             assume f ~ gp(mean = 0, cov = sq_exp(l, 1), at = [0, 0.5, 1], centred = {centred});
+             observe normal(f, 0.3) = [0.5, 0.9, 0.2];
+             infer {{ warmup 2000 {{ {kernel} }} repeat 60000 {{ {kernel} collect l, f; }} }}"
+        )
+    };
+    let white = run(&text(false, "elliptical(@f); drift(@l);"), 31, 2);
+    let centred = run(&text(true, "elliptical(@f); drift(@l);"), 37, 2);
+    let (mw, mc) = (mean(&white["l"]), mean(&centred["l"]));
+    let se = (standard_error(&white["l"]).powi(2) + standard_error(&centred["l"]).powi(2)).sqrt();
+    assert!(se < 0.02 && (mw - mc).abs() < 5.0 * se, "bandwidth: whitened {mw}, centred {mc}, se {se}");
+    // Quadrature over l of the three-dimensional Gaussian marginal.
+    let y = [0.5, 0.9, 0.2];
+    let at = [0.0, 0.5, 1.0];
+    let marginal = |l: f64| {
+        let mut m = [[0.0; 3]; 3];
+        for i in 0..3 {
+            for j in 0..3 {
+                let d: f64 = at[i] - at[j];
+                m[i][j] = (-d * d / (2.0 * l * l)).exp() + if i == j { 0.09 + 1e-6 } else { 0.0 };
+            }
+        }
+        let det = m[0][0] * (m[1][1] * m[2][2] - m[1][2] * m[2][1]) - m[0][1] * (m[1][0] * m[2][2] - m[1][2] * m[2][0])
+            + m[0][2] * (m[1][0] * m[2][1] - m[1][1] * m[2][0]);
+        let minor = |r: usize, c: usize| {
+            let (a, b) = ((r + 1) % 3, (r + 2) % 3);
+            let (p, q) = ((c + 1) % 3, (c + 2) % 3);
+            m[a][p] * m[b][q] - m[a][q] * m[b][p]
+        };
+        let quad: f64 = (0..3).map(|i| (0..3).map(|j| y[i] * minor(j, i) / det * y[j]).sum::<f64>()).sum();
+        (-0.5 * quad).exp() / det.sqrt()
+    };
+    let z = integrate(marginal, 0.2, 2.0, 2000);
+    let expected = integrate(|l| l * marginal(l), 0.2, 2.0, 2000) / z;
+    assert_mean("bandwidth", &white["l"], expected, 0.1);
+}
+
+/// Predictions and what no observation asks for are drawn from the prior given the rest, and never proposed.
+#[test]
+fn predictions_are_drawn_anew_and_not_proposed() {
+    let d = run(
+        "assume x ~ normal(0, 1); observe normal(x, 0.5) = 2;
+         assume unused ~ normal(10, 2);
+         predict y ~ normal(x, 0.5);
+         infer { warmup 500 { drift(@x); } repeat 40000 { drift(@x); collect x, unused; } }",
+        41,
+        2,
+    );
+    assert_mean("y", &d["y"], 1.6, 0.06);
+    assert_mean("unused", &d["unused"], 10.0, 0.1);
+    let lag: f64 = d["unused"].windows(2).map(|w| (w[0] - 10.0) * (w[1] - 10.0)).sum::<f64>()
+        / d["unused"].iter().map(|x| (x - 10.0) * (x - 10.0)).sum::<f64>();
+    assert!(lag.abs() < 0.03, "draws of what nothing asks for are independent, lag-1 correlation {lag}");
+}
