@@ -5,6 +5,7 @@
 
 mod args;
 pub mod data;
+pub mod doc;
 mod elementwise;
 mod forms;
 mod inference;
