@@ -5,7 +5,7 @@
 pub mod diag;
 pub mod dist;
 pub mod geom;
-pub mod infer;
+//pub mod infer;
 pub mod lang;
 pub mod num;
 pub mod render;

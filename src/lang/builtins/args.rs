@@ -1,10 +1,14 @@
 //! Reading the arguments of a built-in, with errors that name the argument.
 
 use super::Builtin;
-use crate::lang::error::Fault;
+use super::elementwise::truth;
+use crate::lang::error::{Fault, FaultKind};
 use crate::lang::value::{Object, Record, Value};
 use std::borrow::Cow;
 use std::sync::Arc;
+
+/// The most elements of an array that a function makes in one go.
+pub const MAX_ELEMENTS: usize = 10_000_000;
 
 /// The arguments of one call, in the table's order; `nothing` stands for those left out.
 pub struct Args<'a> {
@@ -32,17 +36,26 @@ impl<'a> Args<'a> {
 
     /// The error that argument `i` is not what was wanted.
     pub fn wrong(&self, i: usize, wanted: &str) -> Fault {
-        let got = match self.get(i) {
-            Value::Unit => "nothing".to_owned(),
-            v @ (Value::Num(_) | Value::Bool(_) | Value::Str(_)) => format!("{} ({v})", v.type_name()),
-            v => v.type_name().to_owned(),
-        };
-        Fault::type_error(format!("{}: `{}` must be {wanted}, got {got}", self.builtin.name, self.name(i)))
+        let got = described(self.get(i));
+        Fault::type_error(format!("{}: `{}` must be {wanted}, got {got}", self.builtin.full_name(), self.name(i)))
+    }
+
+    /// The error that argument `i` is an array with something in it that does not belong there.
+    pub fn element_wrong(&self, i: usize, wanted: &str, found: &Value) -> Fault {
+        let (name, got) = (self.builtin.full_name(), described(found));
+        Fault::type_error(format!("{name}: `{}` must be {wanted}, got an array with {got} in it", self.name(i)))
+    }
+
+    /// The error that argument `i` has the wrong length.
+    pub fn wrong_length(&self, i: usize, wanted: &str) -> Fault {
+        let (name, got) = (self.builtin.full_name(), self.get(i).len().unwrap_or(0));
+        Fault::type_error(format!("{name}: `{}` must have {wanted}, got {got}", self.name(i)))
     }
 
     /// The error that argument `i` is outside its domain.
     pub fn outside(&self, i: usize, rule: &str) -> Fault {
-        Fault::domain(format!("{}: `{}` must be {rule}, got {}", self.builtin.name, self.name(i), self.get(i)))
+        let (name, got) = (self.builtin.full_name(), self.get(i));
+        Fault::domain(format!("{name}: `{}` must be {rule}, got {got}", self.name(i)))
     }
 
     /// A number.
@@ -68,10 +81,12 @@ impl<'a> Args<'a> {
     pub fn int_in(&self, i: usize, lo: i64, hi: i64) -> Result<i64, Fault> {
         let x = self.num(i)?;
         if x == libm::trunc(x) && x >= lo as f64 && x <= hi as f64 {
-            Ok(x as i64)
-        } else {
-            Err(self.outside(i, &format!("a whole number from {lo} to {hi}")))
+            return Ok(x as i64);
         }
+        Err(match hi {
+            i64::MAX => self.outside(i, &format!("a whole number, at least {lo}")),
+            _ => self.outside(i, &format!("a whole number from {lo} to {hi}")),
+        })
     }
 
     /// A truth value, or a default.
@@ -94,7 +109,7 @@ impl<'a> Args<'a> {
     /// A string among some, or the first of them.
     pub fn choice<'b>(&self, i: usize, options: &'b [&'b str]) -> Result<&'b str, Fault> {
         if !self.given(i) {
-            return Ok(options[0]);
+            return Ok(options.first().copied().unwrap_or_default());
         }
         let s = self.str(i)?;
         options.iter().copied().find(|o| *o == s).ok_or_else(|| {
@@ -113,6 +128,49 @@ impl<'a> Args<'a> {
             Value::List(xs) if xs.is_empty() => Ok(Arc::from([])),
             _ => Err(self.wrong(i, "an array of numbers")),
         }
+    }
+
+    /// An array of numbers or bools, which count 0 and 1.
+    pub fn numbers(&self, i: usize) -> Result<Cow<'a, [f64]>, Fault> {
+        match self.get(i) {
+            Value::Array(xs) => Ok(Cow::Borrowed(xs)),
+            Value::List(xs) => {
+                let number = |x| truth(x).ok_or_else(|| self.element_wrong(i, "an array of numbers or bools", x));
+                xs.iter().map(number).collect::<Result<Vec<_>, _>>().map(Cow::Owned)
+            }
+            _ => Err(self.wrong(i, "an array of numbers")),
+        }
+    }
+
+    /// An array of at least so many numbers.
+    pub fn numbers_from(&self, i: usize, least: usize) -> Result<Cow<'a, [f64]>, Fault> {
+        let xs = self.numbers(i)?;
+        if xs.len() >= least {
+            return Ok(xs);
+        }
+        let plural = if least == 1 { "" } else { "s" };
+        Err(self.wrong_length(i, &format!("at least {least} element{plural}")))
+    }
+
+    /// Two arrays of numbers of equal length.
+    pub fn number_pair(&self, i: usize, j: usize) -> Result<(Cow<'a, [f64]>, Cow<'a, [f64]>), Fault> {
+        let (x, y) = (self.numbers(i)?, self.numbers(j)?);
+        if x.len() == y.len() {
+            return Ok((x, y));
+        }
+        Err(self.wrong_length(j, &format!("as many elements as `{}`, {}", self.name(i), x.len())))
+    }
+
+    /// The number of elements of an array to be made.
+    pub fn count(&self, i: usize) -> Result<usize, Fault> {
+        let n = self.int_in(i, 0, i64::MAX)? as usize;
+        if n <= MAX_ELEMENTS { Ok(n) } else { Err(self.too_many(n as f64)) }
+    }
+
+    /// The error that an array would be too long.
+    pub fn too_many(&self, n: f64) -> Fault {
+        let message = format!("{}: an array of {n} elements is too long", self.builtin.full_name());
+        Fault::new(FaultKind::Limit, message).with_hint(format!("at most {MAX_ELEMENTS} are made in one go"))
     }
 
     /// A vector of exactly three numbers, or one number for all three, or a default.
@@ -145,6 +203,15 @@ impl<'a> Args<'a> {
     /// An object of type `T`; `wanted` says what in words.
     pub fn object<T: Object>(&self, i: usize, wanted: &str) -> Result<&'a T, Fault> {
         self.get(i).downcast::<T>().ok_or_else(|| self.wrong(i, wanted))
+    }
+}
+
+/// What a value is, with the value itself where it is short.
+fn described(v: &Value) -> String {
+    match v {
+        Value::Num(_) | Value::Bool(_) => format!("{} ({v})", v.type_name()),
+        Value::Str(s) if s.chars().count() <= 40 => format!("{} ({v})", v.type_name()),
+        v => v.type_name().to_owned(),
     }
 }
 

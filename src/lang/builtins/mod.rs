@@ -1,14 +1,28 @@
 //! The table of built-ins: every function, distribution, form and kernel with its arguments, units and doc line.
 //!
-//! Evaluation, static checks, `pcadlang doc` and the language reference all read this one table.
+//! Evaluation, static checks, `pcadlang doc` and the language reference all read this one table. Functions here are pure:
+//! the same arguments give the same value to the last bit, on every platform.
 
 mod args;
+pub mod data;
+pub mod doc;
+mod elementwise;
+mod forms;
+mod inference;
+mod list;
+mod math;
+mod matrix;
+mod operators;
+mod reduce;
+mod table;
 
 pub use args::Args;
+pub use table::{Constant, Table};
 
 use super::error::Fault;
 use super::value::Value;
 use crate::dist::Dist;
+use smallvec::SmallVec;
 use std::fmt;
 
 /// The type of an argument or result, as far as it can be told before a run.
@@ -146,6 +160,18 @@ pub struct Builtin {
     pub kind: Kind,
 }
 
+/// A pure function of the language's own namespace.
+const fn function(
+    name: &'static str,
+    section: &'static str,
+    args: &'static [Arg],
+    returns: Type,
+    doc: &'static str,
+    f: fn(&Args) -> Result<Value, Fault>,
+) -> Builtin {
+    Builtin { name, module: "", section, args, variadic: false, returns, doc, kind: Kind::Function(f) }
+}
+
 impl fmt::Debug for Builtin {
     fn fmt(&self, f: &mut fmt::Formatter<'_>) -> fmt::Result {
         write!(f, "{}", self.signature())
@@ -153,9 +179,24 @@ impl fmt::Debug for Builtin {
 }
 
 impl Builtin {
+    /// The same with a last argument that may be given any number of times.
+    const fn variadic(self) -> Builtin {
+        Builtin { variadic: true, ..self }
+    }
+
+    /// Whether this version only checks and documents it, and cannot run it yet.
+    pub fn is_planned(&self) -> bool {
+        matches!(self.kind, Kind::Inference) && inference::PLANNED.contains(&self.name)
+    }
+
+    /// Its name as a program writes it: `normal`, `scene.lathe`.
+    pub fn full_name(&self) -> String {
+        if self.module.is_empty() { self.name.to_owned() } else { format!("{}.{}", self.module, self.name) }
+    }
+
     /// `name(a, b = default)`, as the reference shows it.
     pub fn signature(&self) -> String {
-        let mut s = if self.module.is_empty() { self.name.to_owned() } else { format!("{}.{}", self.module, self.name) };
+        let mut s = self.full_name();
         s.push('(');
         for (i, a) in self.args.iter().enumerate() {
             if i > 0 {
@@ -173,40 +214,58 @@ impl Builtin {
         s.push(')');
         s
     }
-}
 
-/// The built-ins a program sees, by index and by name.
-#[derive(Clone, Debug)]
-pub struct Table {
-    entries: IndexMap<(&'static str, &'static str), Builtin>,
-}
+    /// For each parameter, the index of the written argument that feeds it; `None` for a default. With a variadic last
+    /// parameter the result is as long as what was written. `args` tells the keyword of each argument, if it has one.
+    ///
+    /// # Errors
+    /// Too many arguments, too few, one given twice, an unknown keyword: a message for the user.
+    pub fn match_names<'a>(
+        &self,
+        args: impl Iterator<Item = Option<&'a str>>,
+    ) -> Result<SmallVec<[Option<usize>; 8]>, String> {
+        let mut order: SmallVec<[Option<usize>; 8]> = smallvec::smallvec![None; self.args.len()];
+        let mut written = 0;
+        for (i, keyword) in args.enumerate() {
+            written += 1;
+            let p = match keyword {
+                None if i >= self.args.len() && self.variadic => {
+                    order.push(Some(i));
+                    continue;
+                }
+                None => i,
+                Some(k) => self.args.iter().position(|a| a.name == k).ok_or_else(|| self.no_such_argument(k))?,
+            };
+            // Too many are counted first, so that the message can say how many.
+            if p < order.len() && order[p].replace(i).is_some() {
+                return Err(format!("`{}` gets its argument `{}` twice", self.full_name(), self.args[p].name));
+            }
+        }
+        if written > order.len() {
+            let takes = match self.args.len() {
+                0 => "no arguments".to_owned(),
+                1 => "1 argument".to_owned(),
+                n => format!("{n} arguments"),
+            };
+            return Err(format!("`{}` takes {takes}, got {written}: {}", self.full_name(), self.signature()));
+        }
+        match self.args.iter().zip(&order).find(|(a, o)| a.default.is_none() && o.is_none()) {
+            Some((missing, _)) => {
+                Err(format!("`{}` needs its argument `{}`: {}", self.full_name(), missing.name, self.signature()))
+            }
+            None => Ok(order),
+        }
+    }
 
-impl Default for Table {
-    fn default() -> Self {
-        Table::new([])
+    fn no_such_argument(&self, keyword: &str) -> String {
+        let hint = match crate::diag::nearest(keyword, self.args.iter().map(|a| a.name)) {
+            Some(near) => format!("; did you mean `{near}`?"),
+            None if self.args.is_empty() => "; it takes none".to_owned(),
+            None => format!("; it takes {}", self.args.iter().map(|a| a.name).collect::<Vec<_>>().join(", ")),
+        };
+        format!("`{}` has no argument `{keyword}`{hint}", self.full_name())
     }
 }
 
-impl Table {
-    /// The built-ins of the language and these.
-    pub fn new(more: impl IntoIterator<Item = Builtin>) -> Self {
-        let core = [operators::TABLE, math::TABLE, list::TABLE, distributions::TABLE, forms::TABLE];
-        let all = core.into_iter().flatten().copied().chain(more);
-        Table { entries: all.map(|b| ((b.module, b.name), b)).collect() }
-    }
-
-    /// The built-in at an index.
-    pub fn get(&self, i: u32) -> &Builtin {
-        &self.entries[i as usize]
-    }
-
-    /// The index of a built-in.
-    pub fn find(&self, module: &str, name: &str) -> Option<u32> {
-        self.entries.get_index_of(&(module, name) as &dyn NameKey).map(|i| i as u32)
-    }
-
-    /// All of them, in the order of the reference.
-    pub fn iter(&self) -> impl Iterator<Item = &Builtin> {
-        self.entries.values()
-    }
-}
+#[cfg(test)]
+mod tests;

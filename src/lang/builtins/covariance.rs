@@ -1,0 +1,80 @@
+//! Covariance functions of Gaussian processes, as values: `sq_exp(0.5) + white(0.01)`.
+
+use super::{Arg, Args, Builtin, Type, arg, function, opt};
+use crate::dist::{Covariance, ParamError};
+use crate::lang::error::Fault;
+use crate::lang::value::{Object, Value};
+use std::any::Any;
+
+const SECTION: &str = "Covariances";
+
+/// A covariance function.
+#[derive(Clone, Debug)]
+pub struct CovarianceValue(pub Covariance);
+
+impl Object for CovarianceValue {
+    fn type_name(&self) -> &'static str {
+        "a covariance"
+    }
+
+    fn as_any(&self) -> &dyn Any {
+        self
+    }
+
+    fn multiply(&self, other: &Value) -> Option<Result<Value, String>> {
+        let other = other.downcast::<CovarianceValue>()?;
+        Some(Ok(Value::object(CovarianceValue(self.0.clone() * other.0.clone()))))
+    }
+}
+
+impl CovarianceValue {
+    /// The sum of two covariance functions, if `x` and `y` are such.
+    pub(super) fn sum(x: &Value, y: &Value) -> Option<Value> {
+        let (x, y) = (x.downcast::<CovarianceValue>()?, y.downcast::<CovarianceValue>()?);
+        Some(Value::object(CovarianceValue(x.0.clone() + y.0.clone())))
+    }
+}
+
+const SD: Arg = opt("sd", Type::Num, "1", "The standard deviation.");
+const LENGTH: Arg = arg("length", Type::Num, "The length over which values stay alike, in units of the points.");
+
+const fn covariance(
+    name: &'static str,
+    args: &'static [Arg],
+    doc: &'static str,
+    f: fn(&Args) -> Result<Value, Fault>,
+) -> Builtin {
+    function(name, SECTION, args, Type::Covariance, doc, f)
+}
+
+pub(super) const TABLE: &[Builtin] = &[
+    covariance(
+        "sq_exp",
+        &[LENGTH, SD],
+        "Squared exponential, `sd^2 exp(-(x - y)^2 / (2 length^2))`: very smooth functions.",
+        |a| value(Covariance::sq_exp(a.num(0)?, a.num_or(1, 1.0)?)),
+    ),
+    covariance("matern32", &[LENGTH, SD], "Matérn with nu = 3/2: functions differentiable once.", |a| {
+        value(Covariance::matern32(a.num(0)?, a.num_or(1, 1.0)?))
+    }),
+    covariance("matern52", &[LENGTH, SD], "Matérn with nu = 5/2: functions differentiable twice.", |a| {
+        value(Covariance::matern52(a.num(0)?, a.num_or(1, 1.0)?))
+    }),
+    covariance(
+        "periodic",
+        &[
+            arg("period", Type::Num, "The distance after which functions repeat, in units of the points."),
+            arg("length", Type::Num, "The length of likeness, as a fraction of a period."),
+            SD,
+        ],
+        "Periodic, `sd^2 exp(-2 sin^2(pi (x - y) / period) / length^2)`.",
+        |a| value(Covariance::periodic(a.num(0)?, a.num(1)?, a.num_or(2, 1.0)?)),
+    ),
+    covariance("white", &[SD], "Independent noise at every point; add it to another: `sq_exp(2) + white(0.1)`.", |a| {
+        value(Covariance::white(a.num_or(0, 1.0)?))
+    }),
+];
+
+fn value(made: Result<Covariance, ParamError>) -> Result<Value, Fault> {
+    made.map(|c| Value::object(CovarianceValue(c))).map_err(|e| Fault::domain(e.to_string()))
+}

@@ -1,0 +1,153 @@
+//! Tables as text (RFC 4180): a header line, then one row a line; quoted fields may hold separators and line ends.
+//!
+//! The separator is the one of comma, semicolon and tab that splits the header into most fields. A column is of numbers if
+//! all its fields are, else of bools if all are `true` or `false`, else of strings. There are no missing values: an empty
+//! field in a column of numbers is an error, not a NaN that shows up later.
+
+use crate::lang::value::{Record, Value};
+use std::sync::Arc;
+
+/// A row and the line it starts in, from 1.
+type Row = (usize, Vec<String>);
+
+/// The columns of a table as a record of arrays.
+pub(super) fn parse(bytes: &[u8]) -> Result<Value, String> {
+    let text = std::str::from_utf8(bytes).map_err(|e| format!("not UTF-8 text (byte {})", e.valid_up_to()))?;
+    let text = text.strip_prefix('\u{feff}').unwrap_or(text);
+    let mut rows = rows(text, separator(text))?.into_iter();
+    let Some((_, header)) = rows.next() else { return Err("the table is empty".into()) };
+    if header.iter().all(|h| h.trim().parse::<f64>().is_ok()) {
+        return Err("line 1: the first line must name the columns; it has numbers only".into());
+    }
+    let rows: Vec<Row> = rows.collect();
+    if let Some((line, row)) = rows.iter().find(|(_, row)| row.len() != header.len()) {
+        return Err(format!("line {line}: {} fields where the header has {}", row.len(), header.len()));
+    }
+    let mut table = Record::new();
+    for (i, name) in header.iter().enumerate() {
+        let name = name.trim();
+        if name.is_empty() {
+            return Err(format!("line 1: column {} has no name", i + 1));
+        }
+        if table.insert(Arc::from(name), column(name, i, &rows)?).is_some() {
+            return Err(format!("line 1: there are two columns `{name}`"));
+        }
+    }
+    Ok(Value::Record(Arc::new(table)))
+}
+
+/// The values of a column.
+fn column(name: &str, i: usize, rows: &[Row]) -> Result<Value, String> {
+    let fields = || rows.iter().map(|(line, row)| (*line, row.get(i).map_or("", |f| f.trim())));
+    let numbers: Vec<f64> = fields().filter_map(|(_, f)| f.parse().ok()).collect();
+    if let Some((line, _)) = fields().find(|(_, f)| f.parse::<f64>().is_ok_and(f64::is_nan)) {
+        return Err(format!("line {line}: column `{name}` has a NaN; leave out the row"));
+    }
+    if numbers.len() == rows.len() {
+        return Ok(Value::array(numbers));
+    }
+    if let Some((line, _)) = fields().find(|(_, f)| f.is_empty())
+        && fields().all(|(_, f)| f.is_empty() || f.parse::<f64>().is_ok())
+        && !numbers.is_empty()
+    {
+        return Err(format!("line {line}: column `{name}` is empty there; leave out the row"));
+    }
+    let bools: Vec<Value> = fields().filter_map(|(_, f)| f.parse().ok().map(Value::Bool)).collect();
+    if bools.len() == rows.len() {
+        return Ok(Value::List(bools.into()));
+    }
+    Ok(Value::List(rows.iter().map(|(_, row)| row.get(i).map_or(Value::Unit, |f| Value::str(f))).collect()))
+}
+
+/// The separator that splits the header most often; a comma when none does.
+fn separator(text: &str) -> char {
+    let header = text.lines().next().unwrap_or_default();
+    let count = |c: char| header.matches(c).count();
+    [';', '\t'].into_iter().fold(',', |best, c| if count(c) > count(best) { c } else { best })
+}
+
+/// The rows that are not blank.
+fn rows(text: &str, separator: char) -> Result<Vec<Row>, String> {
+    let mut rows: Vec<Row> = Vec::new();
+    let (mut row, mut field) = (Vec::new(), String::new());
+    let (mut line, mut start) = (1, 1);
+    let mut chars = text.chars().peekable();
+    while let Some(c) = chars.next() {
+        match c {
+            '"' if field.is_empty() => {
+                let opened = line;
+                loop {
+                    match chars.next() {
+                        Some('"') if chars.next_if_eq(&'"').is_none() => break,
+                        Some(c) => {
+                            line += usize::from(c == '\n');
+                            field.push(c);
+                        }
+                        None => return Err(format!("line {opened}: a quoted field is not closed")),
+                    }
+                }
+            }
+            '\n' | '\r' => {
+                if c == '\r' {
+                    chars.next_if_eq(&'\n');
+                }
+                end_row(&mut rows, &mut row, &mut field, start);
+                line += 1;
+                start = line;
+            }
+            c if c == separator => row.push(std::mem::take(&mut field)),
+            c => field.push(c),
+        }
+    }
+    end_row(&mut rows, &mut row, &mut field, start);
+    Ok(rows)
+}
+
+fn end_row(rows: &mut Vec<Row>, row: &mut Vec<String>, field: &mut String, line: usize) {
+    if row.is_empty() && field.trim().is_empty() {
+        field.clear();
+        return;
+    }
+    row.push(std::mem::take(field));
+    rows.push((line, std::mem::take(row)));
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    fn read(text: &str) -> String {
+        match parse(text.as_bytes()) {
+            Ok(v) => v.to_string(),
+            Err(e) => e,
+        }
+    }
+
+    #[test]
+    fn columns_get_the_type_of_all_their_fields() {
+        assert_eq!(read("x,y\n1,2.5\n-3e2, 4\n"), "{ x: [1, -300], y: [2.5, 4] }");
+        assert_eq!(read("x;ok;n\n1;true;a\n2;false;2"), "{ x: [1, 2], ok: [true, false], n: [\"a\", \"2\"] }");
+        assert_eq!(read("\u{feff}a\tb\r\n1\t2\r\n\r\n"), "{ a: [1], b: [2] }");
+        assert_eq!(read("x,y\n"), "{ x: [], y: [] }");
+        assert_eq!(read("x\ninf\n"), "{ x: [inf] }");
+    }
+
+    #[test]
+    fn quotes_protect_separators_and_line_ends() {
+        assert_eq!(read("a,b\n\"1,5\",\"say \"\"hi\"\"\nthere\"\n"), "{ a: [\"1,5\"], b: [\"say \\\"hi\\\"\\nthere\"] }");
+        assert_eq!(read("a,b\n\"1\n2\",x\n3\n"), "line 4: 1 fields where the header has 2");
+    }
+
+    #[test]
+    fn mistakes_name_their_line() {
+        assert_eq!(read(""), "the table is empty");
+        assert_eq!(read("1,2\n3,4"), "line 1: the first line must name the columns; it has numbers only");
+        assert_eq!(read("x,y\n1,2\n3"), "line 3: 1 fields where the header has 2");
+        assert_eq!(read("x,x\n1,2"), "line 1: there are two columns `x`");
+        assert_eq!(read("x,\n1,2"), "line 1: column 2 has no name");
+        assert_eq!(read("x,y\n1,2\n\n,3"), "line 4: column `x` is empty there; leave out the row");
+        assert_eq!(read("x\n1\nnan"), "line 3: column `x` has a NaN; leave out the row");
+        assert_eq!(read("x\n\"1"), "line 2: a quoted field is not closed");
+        assert_eq!(parse(&[b'x', 0xff]).unwrap_err(), "not UTF-8 text (byte 1)");
+    }
+}

@@ -1,0 +1,41 @@
+//! JSON (RFC 8259) as values: objects are records in their order, arrays of numbers pack, null is nothing.
+
+use crate::lang::value::Value;
+use std::sync::Arc;
+
+/// The value of a JSON text. Nesting is limited by the reader, to 128.
+pub(super) fn parse(bytes: &[u8]) -> Result<Value, String> {
+    serde_json::from_slice(bytes).map(convert).map_err(|e| e.to_string())
+}
+
+fn convert(json: serde_json::Value) -> Value {
+    match json {
+        serde_json::Value::Null => Value::Unit,
+        serde_json::Value::Bool(b) => Value::Bool(b),
+        serde_json::Value::Number(n) => Value::Num(n.as_f64().unwrap_or(f64::NAN)),
+        serde_json::Value::String(s) => Value::Str(s.into()),
+        serde_json::Value::Array(xs) => Value::from_elements(xs.into_iter().map(convert).collect()),
+        serde_json::Value::Object(fields) => {
+            Value::Record(Arc::new(fields.into_iter().map(|(k, v)| (Arc::from(k), convert(v))).collect()))
+        }
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    #[test]
+    fn values_keep_their_shape() {
+        let text = r#"{"b": [1, 2.5], "a": {"x": null, "y": [true, "s"]}, "n": 1e-7, "e": []}"#;
+        let v = parse(text.as_bytes()).unwrap();
+        assert_eq!(v.to_string(), r#"{ b: [1, 2.5], a: { x: nothing, y: [true, "s"] }, n: 0.0000001, e: [] }"#);
+    }
+
+    #[test]
+    fn mistakes_name_their_place() {
+        assert_eq!(parse(b"{\"a\": 1,}").unwrap_err(), "trailing comma at line 1 column 9");
+        assert!(parse(&[b'['; 100_000]).unwrap_err().contains("recursion limit"));
+        assert!(parse(b"1e999").is_err(), "no infinities by accident");
+    }
+}

@@ -1,0 +1,55 @@
+//! Data: what a `data` item can hold, and the loaders that read it from a file's bytes.
+//!
+//! The names are built-ins so that they are documented and checked like any other; a program cannot call them on values
+//! it computes, because what a run reads must be known before it starts. Which files may be read, and where they lie, is
+//! the host's business: this module gets bytes.
+
+mod csv;
+mod json;
+
+use super::{Arg, Args, Builtin, Type, arg, function};
+use crate::lang::error::{Fault, FaultKind};
+use crate::lang::value::Value;
+
+const SECTION: &str = "Data files";
+
+const FILE: &[Arg] = &[arg("file", Type::Str, "The path, relative to the program's folder.")];
+
+const fn kind(name: &'static str, returns: Type, doc: &'static str) -> Builtin {
+    function(name, SECTION, FILE, returns, doc, not_an_expression)
+}
+
+pub(super) const TABLE: &[Builtin] = &[
+    kind("csv", Type::Record, "A table with a header line: a record of columns, numbers, bools or strings."),
+    kind("json", Type::Any, "JSON: objects are records, null is nothing."),
+];
+
+fn not_an_expression(a: &Args) -> Result<Value, Fault> {
+    let name = a.builtin.name;
+    let message = format!("{name}: files are read by `data` items only");
+    Err(Fault::new(FaultKind::Other, message).with_hint(format!("write `data d = {name}(\"file\");` at the top level")))
+}
+
+/// The kinds of data that [`load`] reads: what may stand after the colon of `data d: kind;`.
+pub fn kinds() -> impl Iterator<Item = &'static str> {
+    TABLE.iter().map(|b| b.name)
+}
+
+/// Reads data of a kind from the bytes of a file; `file` is what messages call it.
+///
+/// # Errors
+/// An unknown kind, or bytes that are not of that kind: a message with the line where there are lines.
+pub fn load(kind: &str, file: &str, bytes: &[u8]) -> Result<Value, Fault> {
+    let loaded = match kind {
+        "csv" => csv::parse(bytes),
+        "json" => json::parse(bytes),
+        _ => {
+            let fault = Fault::type_error(format!("there is no data of type `{kind}`"));
+            return Err(match crate::diag::nearest(kind, kinds()) {
+                Some(near) => fault.with_hint(format!("did you mean `{near}`?")),
+                None => fault.with_hint(format!("there are {}", kinds().collect::<Vec<_>>().join(", "))),
+            });
+        }
+    };
+    loaded.map_err(|why| Fault::new(FaultKind::Other, format!("{file}: {why}")))
+}

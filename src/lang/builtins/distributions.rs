@@ -1,0 +1,215 @@
+//! The distributions: one built-in per family of [`crate::dist`], which computes and documents them.
+//!
+//! Here parameters are read from values. A parameter that is an array makes a product of independent elements, with an
+//! address each. A parameter outside its domain is a recoverable fault: a proposal that leads there is rejected.
+
+use super::covariance::CovarianceValue;
+use super::elementwise::array_len;
+use super::matrix::Matrix;
+use super::{Arg, Args, Builtin, Kind, Type, arg, opt};
+use crate::dist::{self, Dist, FAMILIES, Family, ParamError};
+use crate::lang::error::Fault;
+use crate::lang::value::Value;
+use std::sync::Arc;
+
+const SECTION: &str = "Distributions";
+
+/// The row of a family whose parameters are all numbers, documented by `dist`.
+macro_rules! scalar {
+    ($name:literal, [$($p:ident),+], $made:expr) => {
+        Builtin {
+            name: $name,
+            module: "",
+            section: SECTION,
+            args: &const { params::<{ [$(stringify!($p)),+].len() }>($name) },
+            variadic: false,
+            returns: Type::Dist,
+            doc: family($name).doc,
+            kind: Kind::Distribution(|a| elementwise(a, |[$($p),+]| $made)),
+        }
+    };
+}
+
+/// The row of any other family.
+const fn other(name: &'static str, args: &'static [Arg], make: fn(&Args) -> Result<Dist, Fault>) -> Builtin {
+    Builtin {
+        name,
+        module: "",
+        section: SECTION,
+        args,
+        variadic: false,
+        returns: Type::Dist,
+        doc: family(name).doc,
+        kind: Kind::Distribution(make),
+    }
+}
+
+pub(super) const TABLE: &[Builtin] = &[
+    scalar!("normal", [mean, sd], dist::Normal::new(mean, sd).map(Dist::Normal)),
+    scalar!("lognormal", [mu, sigma], dist::LogNormal::new(mu, sigma).map(Dist::LogNormal)),
+    scalar!("uniform", [lo, hi], dist::Uniform::new(lo, hi).map(Dist::Uniform)),
+    scalar!("beta", [a, b], dist::Beta::new(a, b).map(Dist::Beta)),
+    scalar!("gamma", [shape, rate], dist::Gamma::new(shape, rate).map(Dist::Gamma)),
+    scalar!("exponential", [rate], dist::Exponential::new(rate).map(Dist::Exponential)),
+    scalar!("half_normal", [sd], dist::HalfNormal::new(sd).map(Dist::HalfNormal)),
+    scalar!("half_cauchy", [location, scale], dist::HalfCauchy::new(location, scale).map(Dist::HalfCauchy)),
+    scalar!("student_t", [df, location, scale], dist::StudentT::new(df, location, scale).map(Dist::StudentT)),
+    scalar!("flip", [p], dist::Flip::new(p).map(Dist::Flip)),
+    scalar!("uniform_discrete", [lo, hi], dist::UniformDiscrete::new(lo, hi).map(Dist::UniformDiscrete)),
+    scalar!("binomial", [n, p], dist::Binomial::new(n, p).map(Dist::Binomial)),
+    scalar!("poisson", [rate], dist::Poisson::new(rate).map(Dist::Poisson)),
+    other("categorical", &[arg("weights", Type::Array, "One weight for each of 0, 1, …; they need not sum to 1.")], |a| {
+        dist::Categorical::new(&a.array(0)?).map(|d| Dist::Categorical(Arc::new(d))).map_err(fault)
+    }),
+    other("dirichlet", &[arg("alpha", Type::Array, "One positive concentration for each share.")], |a| {
+        dist::Dirichlet::new(&a.array(0)?).map(|d| Dist::Dirichlet(Arc::new(d))).map_err(fault)
+    }),
+    other(
+        "mv_normal",
+        &[
+            arg("mean", Type::Array, "The mean vector."),
+            opt("cov", Type::Array, "none", "The covariance matrix, an array of rows; or `chol`, one of them."),
+            opt("chol", Type::Array, "none", "The lower triangular Cholesky factor of the covariance."),
+        ],
+        mv_normal,
+    ),
+    other(
+        "gp",
+        &[
+            arg("mean", Type::Nums, "The mean: one number, or one for each point."),
+            arg("cov", Type::Covariance, "The covariance function: `sq_exp(length)`, …"),
+            arg("at", Type::Array, "The points."),
+            opt("centred", Type::Bool, "false", "Stores the values, instead of the white noise that makes them."),
+        ],
+        gp,
+    ),
+    other(
+        "iid",
+        &[arg("d", Type::Dist, "A distribution."), arg("n", Type::Int, "How many.")],
+        |a| {
+            let Value::Dist(d) = a.get(0) else { return Err(a.wrong(0, "a distribution")) };
+            dist::Iid::new(Dist::clone(d), a.count(1)?).map(|d| Dist::Iid(Arc::new(d))).map_err(fault)
+        },
+    ),
+];
+
+/// What the reference says of a family besides its arguments.
+pub(super) fn notes(name: &str) -> Vec<(&'static str, String)> {
+    let found = FAMILIES.iter().find(|f| f.name == name);
+    found.map_or(Vec::new(), |f| vec![("Support", f.support.to_owned()), ("Density", f.formula.to_owned())])
+}
+
+fn fault(e: ParamError) -> Fault {
+    Fault::domain(e.to_string())
+}
+
+/// A distribution of a number, or a product of such when a parameter is an array.
+fn elementwise<const N: usize>(a: &Args, make: fn([f64; N]) -> Result<Dist, ParamError>) -> Result<Dist, Fault> {
+    let mut parameters = [0.0; N];
+    for (i, p) in parameters.iter_mut().enumerate() {
+        match a.get(i) {
+            Value::Num(x) => *p = *x,
+            _ => return product(a, make),
+        }
+    }
+    make(parameters).map_err(fault)
+}
+
+fn product<const N: usize>(a: &Args, make: fn([f64; N]) -> Result<Dist, ParamError>) -> Result<Dist, Fault> {
+    let mut parameters = [0.0; N];
+    let mut columns: [Option<Arc<[f64]>>; N] = [const { None }; N];
+    // The first array, and its length.
+    let mut first: Option<(usize, usize)> = None;
+    for i in 0..N {
+        match a.get(i) {
+            Value::Num(x) => parameters[i] = *x,
+            v if array_len(v).is_some() => {
+                let xs = a.array(i)?;
+                let (k, n) = *first.get_or_insert((i, xs.len()));
+                if xs.len() != n {
+                    return Err(a.wrong_length(i, &format!("as many elements as `{}`, {n}", a.builtin.args[k].name)));
+                }
+                columns[i] = Some(xs);
+            }
+            _ => return Err(a.wrong(i, "a number or an array of numbers")),
+        }
+    }
+    let element = |k: usize| {
+        for (p, column) in parameters.iter_mut().zip(&columns) {
+            if let Some(xs) = column {
+                *p = xs[k];
+            }
+        }
+        make(parameters).map_err(|e| Fault::domain(format!("{e} (element {k})")))
+    };
+    let elements = (0..first.map_or(0, |(_, n)| n)).map(element).collect::<Result<Vec<_>, _>>()?;
+    dist::Product::new(elements).map(|d| Dist::Product(Arc::new(d))).map_err(fault)
+}
+
+fn mv_normal(a: &Args) -> Result<Dist, Fault> {
+    let mean = a.array(0)?;
+    let made = match (a.given(1), a.given(2)) {
+        (true, false) => dist::MvNormal::from_cov(&mean, &square(a, 1, mean.len())?),
+        (false, true) => dist::MvNormal::from_chol(&mean, &square(a, 2, mean.len())?),
+        _ => return Err(Fault::type_error("mv_normal: give either `cov` or `chol`")),
+    };
+    made.map(|d| Dist::MvNormal(Arc::new(d))).map_err(fault)
+}
+
+/// A square matrix as large as the mean.
+fn square(a: &Args, i: usize, n: usize) -> Result<nalgebra::DMatrix<f64>, Fault> {
+    let m = Matrix::read(a, i)?;
+    if m.rows.len() != n || m.width != n {
+        let (name, rows, columns) = (a.builtin.args[i].name, m.rows.len(), m.width);
+        return Err(Fault::type_error(format!("mv_normal: `{name}` must be {n} x {n} like the mean, got {rows} x {columns}")));
+    }
+    Ok(nalgebra::DMatrix::from_fn(n, n, |i, j| m.rows[i][j]))
+}
+
+fn gp(a: &Args) -> Result<Dist, Fault> {
+    let cov = &a.object::<CovarianceValue>(1, "a covariance such as sq_exp(1)")?.0;
+    let at = a.array(2)?;
+    let mean = match a.get(0) {
+        Value::Num(m) => vec![*m; at.len()],
+        _ => a.array(0)?.to_vec(),
+    };
+    if mean.len() != at.len() {
+        return Err(a.wrong_length(0, &format!("as many elements as there are points, {}", at.len())));
+    }
+    let centred = a.bool_or(3, false)?;
+    dist::Gp::new(mean, cov, &at, centred).map(|d| Dist::Gp(Arc::new(d))).map_err(fault)
+}
+
+/// The family of a name, found while compiling.
+const fn family(name: &str) -> &'static Family {
+    let mut i = 0;
+    while i < FAMILIES.len() {
+        if same_text(FAMILIES[i].name, name) {
+            return &FAMILIES[i];
+        }
+        i += 1;
+    }
+    panic!("no such family of distributions")
+}
+
+const fn same_text(a: &str, b: &str) -> bool {
+    let (a, b) = (a.as_bytes(), b.as_bytes());
+    let mut i = 0;
+    while i < a.len() && i < b.len() && a[i] == b[i] {
+        i += 1;
+    }
+    i == a.len() && i == b.len()
+}
+
+/// The parameters of a family as arguments.
+const fn params<const N: usize>(name: &str) -> [Arg; N] {
+    let family = family(name);
+    assert!(family.params.len() == N, "the family has another number of parameters");
+    let mut args = [arg("", Type::Nums, ""); N];
+    let mut i = 0;
+    while i < N {
+        args[i] = arg(family.params[i].name, Type::Nums, family.params[i].doc);
+        i += 1;
+    }
+    args
+}

@@ -1,0 +1,103 @@
+//! The language reference, made from the table of built-ins: one entry for `pcadlang doc`, and the whole as Markdown.
+
+use super::{Arg, Builtin, Kind, Table, Type};
+use std::fmt::Write;
+
+/// The entry of a built-in or constant as plain text: `normal`, `scene.lathe`, or `lathe` where that is clear.
+pub fn doc(table: &Table, name: &str) -> Option<String> {
+    if let Some(c) = table.constants().iter().find(|c| c.name == name) {
+        return Some(format!("{} = {}\n\n{}\n", c.name, c.value, c.doc));
+    }
+    let exact = table.iter().find(|b| b.full_name() == name);
+    let entries: Vec<&Builtin> = match exact {
+        Some(b) => vec![b],
+        None => table.iter().filter(|b| b.name == name).collect(),
+    };
+    let texts: Vec<String> = entries.into_iter().map(entry).collect();
+    (!texts.is_empty()).then(|| texts.join("\n"))
+}
+
+/// What `doc` says of one built-in.
+fn entry(b: &Builtin) -> String {
+    let mut s = b.signature();
+    if let Some(what) = gives(b) {
+        let _ = write!(s, " -> {what}");
+    }
+    let _ = write!(s, "\n\n{}\n", b.doc);
+    if !b.args.is_empty() {
+        s.push('\n');
+    }
+    let width = b.args.iter().map(|a| a.name.len()).max().unwrap_or(0);
+    for a in b.args {
+        let _ = writeln!(s, "  {:width$}  {} {}", a.name, traits(a), a.doc);
+    }
+    for (what, text) in notes(b) {
+        let _ = write!(s, "\n{what}: {text}\n");
+    }
+    s
+}
+
+/// The reference of every built-in, by section, as Markdown.
+pub fn reference(table: &Table) -> String {
+    let mut s = String::new();
+    let _ = write!(s, "## Constants\n\n");
+    for c in table.constants() {
+        let _ = writeln!(s, "- **`{}`** = {}. {}", c.name, c.value, c.doc);
+    }
+    let mut sections: Vec<&str> = Vec::new();
+    for b in table.iter() {
+        if !sections.contains(&b.section) {
+            sections.push(b.section);
+        }
+    }
+    for section in sections {
+        let _ = write!(s, "\n## {section}\n\n");
+        for b in table.iter().filter(|b| b.section == section) {
+            let _ = write!(s, "- **`{}`**", b.signature());
+            if let Some(what) = gives(b) {
+                let _ = write!(s, " → {what}");
+            }
+            let _ = writeln!(s, ". {}", b.doc);
+            for a in b.args {
+                let _ = writeln!(s, "  - `{}`: {} {}", a.name, traits(a), a.doc);
+            }
+            for (what, text) in notes(b) {
+                let _ = writeln!(s, "  - *{what}*: {text}");
+            }
+        }
+    }
+    s
+}
+
+/// What a call is worth saying to give.
+fn gives(b: &Builtin) -> Option<String> {
+    match b.returns {
+        Type::Any => None,
+        _ => Some(b.returns.to_string()),
+    }
+}
+
+/// Type, unit and default of an argument, as "number, radians, default 0."
+fn traits(a: &Arg) -> String {
+    let mut s = a.ty.to_string();
+    if !a.unit.is_empty() {
+        let _ = write!(s, ", {}", a.unit);
+    }
+    if let Some(d) = a.default {
+        let _ = write!(s, ", default {d}");
+    }
+    s.push('.');
+    s
+}
+
+/// What else there is to say.
+fn notes(b: &Builtin) -> Vec<(&'static str, String)> {
+    let mut notes = Vec::new();
+    if b.is_planned() {
+        notes.push(("Not available yet", "checked, but a run that reaches it ends with an error.".to_owned()));
+    }
+    if matches!(b.kind, Kind::Distribution(_)) {
+
+    }
+    notes
+}

@@ -1,0 +1,114 @@
+//! Functions of single numbers applied to arrays element by element, and arrays of arrays through and through.
+//!
+//! The rule: two arrays need equal lengths; anything else is paired with every element. Plain numbers come first because
+//! nearly every call in a model has them.
+
+use super::Args;
+use crate::lang::error::Fault;
+use crate::lang::value::Value;
+use std::sync::Arc;
+
+/// A function of one number.
+pub(super) fn unary(a: &Args, f: fn(f64) -> f64) -> Result<Value, Fault> {
+    fn go(a: &Args, v: &Value, f: fn(f64) -> f64) -> Result<Value, Fault> {
+        match v {
+            Value::Num(x) => Ok(Value::Num(f(*x))),
+            Value::Array(xs) => Ok(Value::Array(xs.iter().map(|x| f(*x)).collect())),
+            Value::List(xs) => xs.iter().map(|x| go(a, x, f)).collect::<Result<Vec<_>, _>>().map(Value::from_elements),
+            _ => Err(not_a_number(a, 0, v)),
+        }
+    }
+    go(a, a.get(0), f)
+}
+
+/// A function of two numbers.
+pub(super) fn binary(a: &Args, f: fn(f64, f64) -> f64) -> Result<Value, Fault> {
+    numeric(a, a.get(0), a.get(1), f, &|x, y| match x {
+        Value::Num(_) => Err(not_a_number(a, 1, y)),
+        _ => Err(not_a_number(a, 0, x)),
+    })
+}
+
+/// A function of two numbers or arrays of them; `other` takes pairs of which one is neither.
+pub(super) fn numeric(
+    a: &Args,
+    x: &Value,
+    y: &Value,
+    f: fn(f64, f64) -> f64,
+    other: Scalar<'_>,
+) -> Result<Value, Fault> {
+    match (x, y) {
+        (Value::Num(x), Value::Num(y)) => Ok(Value::Num(f(*x, *y))),
+        (Value::Array(xs), Value::Num(y)) => Ok(Value::Array(xs.iter().map(|x| f(*x, *y)).collect())),
+        (Value::Num(x), Value::Array(ys)) => Ok(Value::Array(ys.iter().map(|y| f(*x, *y)).collect())),
+        (Value::Array(xs), Value::Array(ys)) if xs.len() == ys.len() => {
+            Ok(Value::Array(xs.iter().zip(ys.iter()).map(|(x, y)| f(*x, *y)).collect()))
+        }
+        _ => broadcast(a, x, y, &|x, y| match (x, y) {
+            (Value::Num(x), Value::Num(y)) => Ok(Value::Num(f(*x, *y))),
+            _ => other(x, y),
+        }),
+    }
+}
+
+/// What [`broadcast`] does with two values of which neither is an array.
+pub(super) type Scalar<'a> = &'a dyn Fn(&Value, &Value) -> Result<Value, Fault>;
+
+/// Pairs the elements of two values, down to those that are no arrays.
+pub(super) fn broadcast(a: &Args, x: &Value, y: &Value, f: Scalar<'_>) -> Result<Value, Fault> {
+    match common_len(a, x, y)? {
+        None => f(x, y),
+        Some(n) => {
+            let parts = (0..n).map(|i| broadcast(a, &part(x, i), &part(y, i), f));
+            parts.collect::<Result<Vec<_>, _>>().map(Value::from_elements)
+        }
+    }
+}
+
+/// The length two values have together; `None` when neither is an array.
+pub(super) fn common_len(a: &Args, x: &Value, y: &Value) -> Result<Option<usize>, Fault> {
+    match (array_len(x), array_len(y)) {
+        (Some(m), Some(n)) if m != n => {
+            let name = a.builtin.full_name();
+            Err(Fault::type_error(format!("{name}: an array of {m} and an array of {n} do not go together")))
+        }
+        (m, n) => Ok(m.or(n)),
+    }
+}
+
+/// Element `i` of an array; anything else stands for every element.
+pub(super) fn part(v: &Value, i: usize) -> Value {
+    v.element(i).unwrap_or_else(|| v.clone())
+}
+
+/// The length, of arrays only.
+pub(super) fn array_len(v: &Value) -> Option<usize> {
+    match v {
+        Value::Array(xs) => Some(xs.len()),
+        Value::List(xs) => Some(xs.len()),
+        _ => None,
+    }
+}
+
+/// A number or bool among the elements of an array.
+pub(super) fn truth(v: &Value) -> Option<f64> {
+    match v {
+        Value::Num(x) => Some(*x),
+        Value::Bool(b) => Some(f64::from(u8::from(*b))),
+        _ => None,
+    }
+}
+
+/// The error that an argument, or something in it, is no number.
+pub(super) fn not_a_number(a: &Args, i: usize, found: &Value) -> Fault {
+    match array_len(a.get(i)) {
+        Some(_) => a.element_wrong(i, "a number or an array of numbers", found),
+        None => a.wrong(i, "a number or an array of numbers"),
+    }
+}
+
+/// An array of numbers made element by element.
+pub(super) fn array(n: usize, f: impl FnMut(usize) -> f64) -> Value {
+    let xs: Arc<[f64]> = (0..n).map(f).collect();
+    Value::Array(xs)
+}

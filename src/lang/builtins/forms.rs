@@ -1,0 +1,49 @@
+//! Forms: built-ins that are lowered to operations of their own, because they call functions or look at the whole trace.
+
+use super::{Arg, Builtin, Form, Kind, Type, arg};
+
+const SECTION: &str = "Forms";
+
+const fn form(name: &'static str, args: &'static [Arg], returns: Type, doc: &'static str, form: Form) -> Builtin {
+    Builtin { name, module: "", section: SECTION, args, variadic: false, returns, doc, kind: Kind::Form(form) }
+}
+
+pub(super) const TABLE: &[Builtin] = &[
+    form(
+        "map",
+        &[
+            arg("f", Type::Function, "A function of one argument; it may draw."),
+            arg("xs", Type::Any, "An array or record."),
+        ],
+        Type::Any,
+        "The results of `f` for each element, in the shape of `xs`; addresses get the position or name as key.",
+        Form::Map,
+    ),
+    form(
+        "fold",
+        &[
+            arg("f", Type::Function, "A function of the running value and an element; it may draw."),
+            arg("init", Type::Any, "The first running value."),
+            arg("xs", Type::Any, "An array or record."),
+        ],
+        Type::Any,
+        "The last running value after all elements from left to right.",
+        Form::Fold,
+    ),
+    form(
+        "mem",
+        &[arg("f", Type::Function, "A function; its arguments must be numbers, strings, bools or arrays of them.")],
+        Type::Function,
+        "A function that calls `f` once per distinct argument and remembers what it drew.",
+        Form::Mem,
+    ),
+    form("log_joint", &[], Type::Num, "The log joint density of all choices and observations.", Form::LogJoint),
+    form("log_prior", &[], Type::Num, "The log density of the unobserved choices.", Form::LogPrior),
+    form(
+        "log_likelihood",
+        &[],
+        Type::Num,
+        "The log density of the observations, factors included.",
+        Form::LogLikelihood,
+    ),
+];

@@ -1,0 +1,218 @@
+//! Names known to inference blocks, user kernels and reports only: kernels, starts, monitors.
+//!
+//! This is their documentation and their arguments; what they do is the business of the engine. They are not values of
+//! the model.
+
+use super::{Arg, Builtin, Kind, Type, arg, opt};
+
+const KERNELS: &str = "Kernels";
+const CHOICES: &str = "Selections and starts";
+const MONITORS: &str = "Monitors and reports";
+
+/// What this version checks and documents but cannot run.
+pub(super) const PLANNED: &[&str] = &[
+    "slice", "hmc", "nuts", "mala", "knn", "delayed", "temper", "smc", "abc", "optimize", "marginal", "acceptance", "rhat",
+    "ess", "snapshot", "keypoints",
+];
+
+const fn name(
+    name: &'static str,
+    section: &'static str,
+    args: &'static [Arg],
+    returns: Type,
+    doc: &'static str,
+) -> Builtin {
+    Builtin { name, module: "", section, args, variadic: false, returns, doc, kind: Kind::Inference }
+}
+
+const SEL: Arg = arg("sel", Type::Selection, "The choices it moves.");
+const INNER: Arg = arg("move", Type::Kernel, "The kernel inside.");
+const X: Arg = arg("x", Type::Any, "A number of the model, as in `collect`.");
+
+pub(super) const TABLE: &[Builtin] = &[
+    name(
+        "mh",
+        KERNELS,
+        &[SEL],
+        Type::Kernel,
+        "Metropolis-Hastings that draws one of the selected choices anew from its prior.",
+    ),
+    name(
+        "block",
+        KERNELS,
+        &[SEL],
+        Type::Kernel,
+        "Metropolis-Hastings that draws all selected choices together anew from their prior.",
+    ),
+    name(
+        "drift",
+        KERNELS,
+        &[SEL, opt("scale", Type::Num, "learnt", "A fixed step size in the unconstrained space, instead of one learnt in warm-up.")],
+        Type::Kernel,
+        "Gaussian random walk in the unconstrained space of the support; discrete choices step to another value.",
+    ),
+    name(
+        "gibbs",
+        KERNELS,
+        &[SEL],
+        Type::Kernel,
+        "Draws a selected finite discrete choice from its exact conditional, by enumeration of its values.",
+    ),
+    name(
+        "elliptical",
+        KERNELS,
+        &[SEL],
+        Type::Kernel,
+        "Elliptical slice sampling of choices with a Gaussian prior: normal, mv_normal, gp (Murray et al. 2010).",
+    ),
+    name(
+        "slice",
+        KERNELS,
+        &[SEL, opt("width", Type::Num, "1", "The first width, in the unconstrained space; warm-up adapts it.")],
+        Type::Kernel,
+        "Slice sampling of one number at a time with stepping out (Neal 2003).",
+    ),
+    name(
+        "hmc",
+        KERNELS,
+        &[SEL, opt("steps", Type::Int, "10", "The leapfrog steps of one proposal.")],
+        Type::Kernel,
+        "Hamiltonian Monte Carlo; step size and metric are adapted in warm-up (Neal 2011).",
+    ),
+    name(
+        "nuts",
+        KERNELS,
+        &[SEL, opt("max_depth", Type::Int, "10", "At most 2 to this power leapfrog steps.")],
+        Type::Kernel,
+        "The No-U-Turn sampler (Hoffman and Gelman 2014).",
+    ),
+    name("mala", KERNELS, &[SEL], Type::Kernel, "The Metropolis-adjusted Langevin algorithm: one gradient a proposal."),
+    name(
+        "knn",
+        KERNELS,
+        &[
+            SEL,
+            arg("bank", Type::Str, "A file made by `pcadlang learn`."),
+            opt("k", Type::Int, "10", "How many neighbours."),
+        ],
+        Type::Kernel,
+        "Independence proposal from the latents of the pictures in a bank that look most like the observed one.",
+    ),
+    name(
+        "delayed",
+        KERNELS,
+        &[INNER, arg("at", Type::Selection, "The observation with a coarse surrogate.")],
+        Type::Kernel,
+        "Delayed acceptance: the surrogate decides first, the full likelihood corrects it (Christen and Fox 2005).",
+    ),
+    name(
+        "temper",
+        KERNELS,
+        &[INNER, opt("levels", Type::Int, "6", "The number of temperatures.")],
+        Type::Kernel,
+        "Replica exchange over powers of the likelihood.",
+    ),
+    name(
+        "smc",
+        KERNELS,
+        &[INNER, opt("particles", Type::Int, "100", "The number of particles.")],
+        Type::Kernel,
+        "Annealed sequential Monte Carlo with rejuvenation by the kernel inside; estimates the evidence.",
+    ),
+    name(
+        "abc",
+        KERNELS,
+        &[INNER, arg("eps", Type::Num, "The largest distance that is accepted.")],
+        Type::Kernel,
+        "Likelihood-free acceptance by a distance.",
+    ),
+    name(
+        "optimize",
+        KERNELS,
+        &[SEL, opt("steps", Type::Int, "100", "The number of gradient steps.")],
+        Type::Kernel,
+        "Climbs to a mode of the posterior; for a start, or an answer in a hurry. Not a sampler.",
+    ),
+    name(
+        "marginal",
+        CHOICES,
+        &[SEL],
+        Type::Selection,
+        "In hmc and nuts: the selected finite discrete choices are summed out of the density.",
+    ),
+    name(
+        "one",
+        CHOICES,
+        &[SEL],
+        Type::Selection,
+        "One of the selected choices, picked uniformly at each step; the ratio of their numbers is paid for.",
+    ),
+    name(
+        "init",
+        CHOICES,
+        &[arg("start", Type::Kernel, "`prior()` or `best_of(n)`.")],
+        Type::Kernel,
+        "How a chain starts; without it, from the prior.",
+    ),
+    name(
+        "anneal",
+        CHOICES,
+        &[arg("from", Type::Num, "The temperature at the start, at least 1.")],
+        Type::Kernel,
+        "In `warmup` only: raises the power of the likelihood from `1 / from` to 1 over the warm-up.",
+    ),
+    name("prior", CHOICES, &[], Type::Kernel, "A start drawn from the prior."),
+    name(
+        "best_of",
+        CHOICES,
+        &[arg("n", Type::Int, "How many draws from the prior.")],
+        Type::Kernel,
+        "A start: the draw from the prior with the highest log joint density.",
+    ),
+    name(
+        "value",
+        CHOICES,
+        &[arg("at", Type::Selection, "The address of one choice.")],
+        Type::Any,
+        "The present value of a choice, in user kernels and conditions.",
+    ),
+    name("elapsed", MONITORS, &[], Type::Num, "The time since the chain began, in seconds."),
+    name("steps", MONITORS, &[], Type::Int, "The number of kernel applications of this chain so far."),
+    name("acceptance", MONITORS, &[], Type::Num, "The fraction of proposals that this chain accepted after warm-up."),
+    name(
+        "rhat",
+        MONITORS,
+        &[X],
+        Type::Num,
+        "Rank-normalised split R-hat over all chains, evaluated at step barriers (Vehtari et al. 2021).",
+    ),
+    name("ess", MONITORS, &[X], Type::Num, "The bulk effective sample size over all chains (Vehtari et al. 2021)."),
+    name(
+        "snapshot",
+        MONITORS,
+        &[arg("view", Type::Object("view"), "What is drawn.")],
+        Type::Kernel,
+        "Writes a picture of the view as it is now to the run's folder.",
+    ),
+    name(
+        "summary",
+        MONITORS,
+        &[opt("sel", Type::Selection, "@**", "The choices summarised.")],
+        Type::Any,
+        "Mean, sd, interval, effective sample size and R-hat of each selected choice.",
+    ),
+    name(
+        "keypoints",
+        MONITORS,
+        &[arg("view", Type::Object("view"), "A view of a scene with an armature.")],
+        Type::Any,
+        "Posterior means and spreads of the joints, in pixels of the photograph.",
+    ),
+    name(
+        "best",
+        MONITORS,
+        &[arg("x", Type::Any, "An expression of the model.")],
+        Type::Any,
+        "Its value in the draw with the highest log joint density.",
+    ),
+];

@@ -1,0 +1,275 @@
+//! Making, joining and searching arrays and records; truth tests over arrays; strings.
+
+use super::elementwise::{array, array_len, common_len, part};
+use super::{Arg, Args, Builtin, Type, arg, function, opt};
+use crate::lang::error::{Fault, FaultKind};
+use crate::lang::key::Key;
+use crate::lang::value::Value;
+use std::cmp::Ordering;
+use std::sync::Arc;
+
+const SECTION: &str = "Arrays and records";
+
+const XS: &[Arg] = &[arg("xs", Type::Array, "An array.")];
+const N: &[Arg] = &[arg("n", Type::Int, "The number of elements.")];
+const BOOLS: &[Arg] = &[arg("xs", Type::Array, "Bools.")];
+const FIELDS: &[Arg] = &[arg("r", Type::Any, "A record, or an array whose keys are its positions.")];
+
+pub(super) const TABLE: &[Builtin] = &[
+    function(
+        "len",
+        SECTION,
+        &[arg("x", Type::Any, "An array, record or string.")],
+        Type::Int,
+        "The number of elements, fields or characters.",
+        len,
+    ),
+    function(
+        "linspace",
+        SECTION,
+        &[
+            arg("lo", Type::Num, "The first number."),
+            arg("hi", Type::Num, "The last number."),
+            arg("n", Type::Int, "How many; a single one is `lo`."),
+        ],
+        Type::Array,
+        "`n` evenly spaced numbers from `lo` to `hi`, both included.",
+        linspace,
+    ),
+    function(
+        "range",
+        SECTION,
+        &[
+            arg("start", Type::Num, "The first number."),
+            arg("end", Type::Num, "The end, itself left out."),
+            opt("step", Type::Num, "1", "The difference of neighbours; may be negative, not 0."),
+        ],
+        Type::Array,
+        "`start`, `start + step`, … before `end`; for whole numbers write `a .. b`.",
+        range,
+    ),
+    function("zeros", SECTION, N, Type::Array, "An array of `n` zeros.", |a| Ok(array(a.count(0)?, |_| 0.0))),
+    function("ones", SECTION, N, Type::Array, "An array of `n` ones.", |a| Ok(array(a.count(0)?, |_| 1.0))),
+    function(
+        "fill",
+        SECTION,
+        &[arg("x", Type::Any, "The element."), arg("n", Type::Int, "The number of elements.")],
+        Type::Array,
+        "An array of `n` times `x`.",
+        |a| match a.get(0) {
+            Value::Num(x) => Ok(array(a.count(1)?, |_| *x)),
+            x => Ok(Value::from_elements(vec![x.clone(); a.count(1)?])),
+        },
+    ),
+    function(
+        "concat",
+        SECTION,
+        &[arg("xs", Type::Array, "Arrays, or strings.")],
+        Type::Any,
+        "The arguments joined end to end.",
+        concat,
+    )
+    .variadic(),
+    function(
+        "append",
+        SECTION,
+        &[arg("xs", Type::Array, "An array."), arg("x", Type::Any, "The new element.")],
+        Type::Array,
+        "The array with one more element.",
+        |a| {
+            let mut xs = a.elements(0)?.into_owned();
+            xs.push(a.get(1).clone());
+            Ok(Value::from_elements(xs))
+        },
+    ),
+    function("reverse", SECTION, XS, Type::Array, "The elements from the last to the first.", |a| {
+        let mut xs = a.elements(0)?.into_owned();
+        xs.reverse();
+        Ok(Value::from_elements(xs))
+    }),
+    function("sort", SECTION, XS, Type::Array, "Numbers or strings in ascending order, NaN last.", |a| {
+        let xs = a.elements(0)?;
+        let order = sorted(a, &xs)?;
+        Ok(Value::from_elements(order.into_iter().filter_map(|i| xs.get(i).cloned()).collect()))
+    }),
+    function("argsort", SECTION, XS, Type::Array, "The positions of the elements in ascending order.", |a| {
+        let xs = a.elements(0)?;
+        Ok(Value::array(sorted(a, &xs)?.into_iter().map(|i| i as f64).collect::<Vec<_>>()))
+    }),
+    function("argmax", SECTION, XS, Type::Int, "The position of the largest number, the first of equals.", |a| {
+        best(a, |x, best| x > best)
+    }),
+    function("argmin", SECTION, XS, Type::Int, "The position of the smallest number, the first of equals.", |a| {
+        best(a, |x, best| x < best)
+    }),
+    function(
+        "zip",
+        SECTION,
+        &[arg("xs", Type::Array, "An array."), arg("ys", Type::Array, "Another as long.")],
+        Type::Array,
+        "The array of the pairs `[x, y]`.",
+        |a| {
+            let (xs, ys) = (a.elements(0)?, a.elements(1)?);
+            if xs.len() != ys.len() {
+                return Err(a.wrong_length(1, &format!("as many elements as `xs`, {}", xs.len())));
+            }
+            let pair = |(x, y): (&Value, &Value)| Value::from_elements(vec![x.clone(), y.clone()]);
+            Ok(Value::List(xs.iter().zip(ys.iter()).map(pair).collect()))
+        },
+    ),
+    function("keys", SECTION, FIELDS, Type::Array, "The names of the fields in order.", |a| match a.get(0) {
+        Value::Record(r) => Ok(Value::List(r.keys().map(|k| Value::Str(Arc::clone(k))).collect())),
+        v => Ok(array(array_len(v).ok_or_else(|| a.wrong(0, "a record or array"))?, |i| i as f64)),
+    }),
+    function("values", SECTION, FIELDS, Type::Array, "The values of the fields in order.", |a| match a.get(0) {
+        Value::Record(r) => Ok(Value::from_elements(r.values().cloned().collect())),
+        v if array_len(v).is_some() => Ok(v.clone()),
+        _ => Err(a.wrong(0, "a record or array")),
+    }),
+    function(
+        "has",
+        SECTION,
+        &[arg("r", Type::Any, "A record, or an array."), arg("key", Type::Any, "The name of a field, or a position.")],
+        Type::Bool,
+        "Whether the record has such a field, or the array such a position.",
+        |a| match (a.get(0), a.get(1)) {
+            (Value::Record(r), Value::Str(k)) => Ok(Value::Bool(r.contains_key(k))),
+            (Value::Record(_), _) => Err(a.wrong(1, "a string")),
+            (v, k) => match (array_len(v), k) {
+                (Some(n), Value::Num(_)) => {
+                    Ok(Value::Bool(Key::from_value(k).and_then(|k| k.as_index()).is_some_and(|i| i < n)))
+                }
+                (Some(_), _) => Err(a.wrong(1, "a number")),
+                _ => Err(a.wrong(0, "a record or array")),
+            },
+        },
+    ),
+    function("any", SECTION, BOOLS, Type::Bool, "Whether one element at least is true.", |a| {
+        Ok(Value::Bool(bools(a)?.contains(&true)))
+    }),
+    function("all", SECTION, BOOLS, Type::Bool, "Whether every element is true.", |a| {
+        Ok(Value::Bool(!bools(a)?.contains(&false)))
+    }),
+    function(
+        "select",
+        SECTION,
+        &[
+            arg("cond", Type::Any, "A bool, or an array of bools."),
+            arg("a", Type::Any, "What is taken where it is true."),
+            arg("b", Type::Any, "What is taken where it is false."),
+        ],
+        Type::Any,
+        "`a` where the condition is true, `b` where it is not, element by element; both are always computed.",
+        |a| select(a, a.get(0), a.get(1), a.get(2)),
+    ),
+    function(
+        "str",
+        SECTION,
+        &[arg("x", Type::Any, "A value.")],
+        Type::Str,
+        "The value as text; long arrays are shortened.",
+        |a| match a.get(0) {
+            s @ Value::Str(_) => Ok(s.clone()),
+            v => Ok(Value::Str(v.to_string().into())),
+        },
+    ),
+];
+
+fn len(a: &Args) -> Result<Value, Fault> {
+    let n = match a.get(0) {
+        Value::Str(s) => s.chars().count(),
+        v => v.len().ok_or_else(|| a.wrong(0, "an array, record or string"))?,
+    };
+    Ok(Value::Num(n as f64))
+}
+
+fn linspace(a: &Args) -> Result<Value, Fault> {
+    let (lo, hi, n) = (a.num(0)?, a.num(1)?, a.count(2)?);
+    let last = n.saturating_sub(1);
+    // The ends are exact, and neighbours never swap by rounding.
+    let at = |i| {
+        if i == 0 {
+            lo
+        } else if i == last {
+            hi
+        } else {
+            lo + (hi - lo) * (i as f64 / last as f64)
+        }
+    };
+    Ok(array(n, at))
+}
+
+fn range(a: &Args) -> Result<Value, Fault> {
+    let (start, end, step) = (a.num(0)?, a.num(1)?, a.num_or(2, 1.0)?);
+    let n = libm::ceil((end - start) / step);
+    if n.is_nan() || step == 0.0 {
+        return Err(Fault::domain(format!("range: no steps of {step} lead from {start} to {end}")));
+    }
+    if n > super::args::MAX_ELEMENTS as f64 {
+        return Err(a.too_many(n));
+    }
+    Ok(array(n.max(0.0) as usize, |i| start + i as f64 * step))
+}
+
+fn concat(a: &Args) -> Result<Value, Fault> {
+    if let Value::Str(_) = a.get(0) {
+        let parts = (0..a.values.len()).map(|i| a.str(i)).collect::<Result<Vec<_>, _>>()?;
+        return Ok(Value::Str(parts.concat().into()));
+    }
+    let mut all = Vec::new();
+    for i in 0..a.values.len() {
+        all.extend(a.elements(i)?.iter().cloned());
+    }
+    Ok(Value::from_elements(all))
+}
+
+/// The positions in ascending order, equals in the order they had.
+fn sorted(a: &Args, xs: &[Value]) -> Result<Vec<usize>, Fault> {
+    let mut order: Vec<usize> = (0..xs.len()).collect();
+    if xs.iter().all(|x| matches!(x, Value::Num(_))) || xs.iter().all(|x| matches!(x, Value::Str(_))) {
+        order.sort_by(|i, j| ascending(&xs[*i], &xs[*j]));
+        return Ok(order);
+    }
+    Err(a.wrong(0, "an array of numbers, or one of strings"))
+}
+
+fn ascending(x: &Value, y: &Value) -> Ordering {
+    match (x, y) {
+        // Total, so that NaN of either sign comes last; -0 and 0 are equal.
+        (Value::Num(x), Value::Num(y)) => x.is_nan().cmp(&y.is_nan()).then_with(|| (x + 0.0).total_cmp(&(y + 0.0))),
+        (Value::Str(x), Value::Str(y)) => x.cmp(y),
+        _ => Ordering::Equal,
+    }
+}
+
+/// The position of the best number; NaN never is.
+fn best(a: &Args, better: fn(f64, f64) -> bool) -> Result<Value, Fault> {
+    let xs = a.numbers_from(0, 1)?;
+    let mut found: Option<(usize, f64)> = None;
+    for (i, x) in xs.iter().enumerate() {
+        if !x.is_nan() && found.is_none_or(|(_, best)| better(*x, best)) {
+            found = Some((i, *x));
+        }
+    }
+    let nan = || Fault::new(FaultKind::Domain, format!("{}: every element is NaN", a.builtin.name));
+    found.map(|(i, _)| Value::Num(i as f64)).ok_or_else(nan)
+}
+
+fn bools(a: &Args) -> Result<Vec<bool>, Fault> {
+    let bool = |x: &Value| match x {
+        Value::Bool(b) => Ok(*b),
+        x => Err(a.element_wrong(0, "an array of bools", x)),
+    };
+    a.elements(0)?.iter().map(bool).collect()
+}
+
+fn select(a: &Args, cond: &Value, x: &Value, y: &Value) -> Result<Value, Fault> {
+    if let Value::Bool(b) = cond {
+        return Ok(if *b { x.clone() } else { y.clone() });
+    }
+    let Some(n) = array_len(cond) else { return Err(a.wrong(0, "a bool or an array of bools")) };
+    common_len(a, cond, x)?;
+    common_len(a, cond, y)?;
+    let chosen = (0..n).map(|i| select(a, &part(cond, i), &part(x, i), &part(y, i)));
+    chosen.collect::<Result<Vec<_>, _>>().map(Value::from_elements)
+}

@@ -1,0 +1,137 @@
+//! Matrices: arrays of rows, every row an array of as many numbers.
+//!
+//! Plain triple loops in a fixed order: the matrices of a model are small, and results must not depend on a machine.
+
+use super::elementwise::array;
+use super::reduce::dot;
+use super::{Args, Builtin, Type, arg, function};
+use crate::lang::error::Fault;
+use crate::lang::value::Value;
+use std::borrow::Cow;
+
+const SECTION: &str = "Matrices";
+
+pub(super) const TABLE: &[Builtin] = &[
+    function(
+        "matmul",
+        SECTION,
+        &[
+            arg("a", Type::Array, "A matrix, or a vector taken as a row."),
+            arg("b", Type::Array, "A matrix, or a vector taken as a column."),
+        ],
+        Type::Any,
+        "The matrix product; a vector gives a vector, two vectors their dot product.",
+        matmul,
+    ),
+    function(
+        "transpose",
+        SECTION,
+        &[arg("a", Type::Array, "A matrix.")],
+        Type::Array,
+        "The matrix with rows and columns exchanged.",
+        |a| {
+            let m = Matrix::read(a, 0)?;
+            Ok(m.transposed().into_value())
+        },
+    ),
+    function(
+        "diag",
+        SECTION,
+        &[arg("x", Type::Array, "A vector, or a matrix.")],
+        Type::Array,
+        "The diagonal matrix of a vector, or the diagonal of a matrix.",
+        |a| match a.get(0) {
+            Value::Array(xs) => Ok(rows(xs.len(), |i| array(xs.len(), |j| if i == j { xs[i] } else { 0.0 }))),
+            _ => {
+                let m = Matrix::read(a, 0)?;
+                Ok(array(m.rows.len().min(m.width), |i| m.rows[i][i]))
+            }
+        },
+    ),
+    function(
+        "outer",
+        SECTION,
+        &[arg("xs", Type::Array, "A vector."), arg("ys", Type::Array, "A vector.")],
+        Type::Array,
+        "The matrix of the products `xs[i] * ys[j]`.",
+        |a| {
+            let (xs, ys) = (a.numbers(0)?, a.numbers(1)?);
+            Ok(rows(xs.len(), |i| array(ys.len(), |j| xs[i] * ys[j])))
+        },
+    ),
+    function(
+        "identity",
+        SECTION,
+        &[arg("n", Type::Int, "The number of rows and columns, at most 3000.")],
+        Type::Array,
+        "The unit matrix.",
+        |a| {
+            let n = a.int_in(0, 0, 3000)? as usize;
+            Ok(rows(n, |i| array(n, |j| f64::from(u8::from(i == j)))))
+        },
+    ),
+];
+
+/// Rows of equal length, borrowed from a value.
+pub(super) struct Matrix<'a> {
+    /// The rows.
+    pub rows: Vec<Cow<'a, [f64]>>,
+    /// The length of each.
+    pub width: usize,
+}
+
+impl<'a> Matrix<'a> {
+    /// Argument `i` as a matrix.
+    pub fn read(a: &Args<'a>, i: usize) -> Result<Self, Fault> {
+        let wrong = || a.wrong(i, "a matrix, an array of rows of numbers");
+        let Value::List(list) = a.get(i) else { return Err(wrong()) };
+        let row = |v: &'a Value| match v {
+            Value::Array(xs) => Ok(Cow::Borrowed(&**xs)),
+            _ => Err(wrong()),
+        };
+        let rows = list.iter().map(row).collect::<Result<Vec<_>, Fault>>()?;
+        let width = rows.first().map_or(0, |r| r.len());
+        match rows.iter().position(|r| r.len() != width) {
+            Some(k) => {
+                let what = format!("rows of one length; row 0 has {width} numbers, row {k} has {}", rows[k].len());
+                Err(Fault::type_error(format!("{}: a matrix has {what}", a.builtin.full_name())))
+            }
+            None => Ok(Matrix { rows, width }),
+        }
+    }
+
+    fn transposed(&self) -> Matrix<'static> {
+        let column = |j: usize| Cow::Owned(self.rows.iter().map(|r| r[j]).collect());
+        Matrix { rows: (0..self.width).map(column).collect(), width: self.rows.len() }
+    }
+
+    fn into_value(self) -> Value {
+        Value::List(self.rows.into_iter().map(|r| Value::array(r.into_owned())).collect())
+    }
+}
+
+fn rows(n: usize, row: impl FnMut(usize) -> Value) -> Value {
+    Value::List((0..n).map(row).collect())
+}
+
+fn matmul(a: &Args) -> Result<Value, Fault> {
+    let is_vector = |i: usize| matches!(a.get(i), Value::Array(_));
+    let left = if is_vector(0) { single_row(a, 0)? } else { Matrix::read(a, 0)? };
+    let right = if is_vector(1) { single_row(a, 1)? } else { Matrix::read(a, 1)?.transposed() };
+    if left.width != right.width {
+        let (m, n) = (left.width, right.width);
+        return Err(Fault::type_error(format!("matmul: `a` has {m} columns, `b` has {n} rows")));
+    }
+    let cell = |i: usize, j: usize| dot(&left.rows[i], &right.rows[j]);
+    Ok(match (is_vector(0), is_vector(1)) {
+        (true, true) => Value::Num(cell(0, 0)),
+        (true, false) => array(right.rows.len(), |j| cell(0, j)),
+        (false, true) => array(left.rows.len(), |i| cell(i, 0)),
+        (false, false) => rows(left.rows.len(), |i| array(right.rows.len(), |j| cell(i, j))),
+    })
+}
+
+fn single_row<'a>(a: &Args<'a>, i: usize) -> Result<Matrix<'a>, Fault> {
+    let xs = a.numbers(i)?;
+    Ok(Matrix { width: xs.len(), rows: vec![xs] })
+}

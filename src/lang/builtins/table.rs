@@ -1,0 +1,75 @@
+//! The built-ins a program sees, by index and by name, and the named constants.
+//!
+//! Not a scope: shadowing by a program's own names is the business of lowering.
+
+use super::{Builtin, data, forms, inference, list, math, matrix, operators, reduce};
+use indexmap::IndexMap;
+use rustc_hash::FxBuildHasher;
+
+/// A name with a fixed value.
+#[derive(Clone, Copy, Debug, PartialEq)]
+pub struct Constant {
+    /// Its name.
+    pub name: &'static str,
+    /// Its value.
+    pub value: f64,
+    /// One line about it.
+    pub doc: &'static str,
+}
+
+const CONSTANTS: &[Constant] = &[
+    Constant { name: "pi", value: std::f64::consts::PI, doc: "The ratio of a circle's circumference to its diameter." },
+    Constant { name: "inf", value: f64::INFINITY, doc: "Positive infinity; `-inf` is the log of zero." },
+];
+
+/// Those of the language, in the order of the reference.
+pub(super) fn all() -> impl Iterator<Item = Builtin> {
+    let own =
+        [operators::TABLE, math::TABLE, reduce::TABLE, list::TABLE, matrix::TABLE, forms::TABLE, data::TABLE, inference::TABLE];
+    own.into_iter().flatten().copied()
+}
+
+/// The built-ins a program sees, by index and by name.
+#[derive(Clone, Debug)]
+pub struct Table {
+    entries: IndexMap<(&'static str, &'static str), Builtin, FxBuildHasher>,
+}
+
+impl Default for Table {
+    fn default() -> Self {
+        Table::new([])
+    }
+}
+
+impl Table {
+    /// The built-ins of the language and these; one of the same module and name replaces the language's own.
+    pub fn new(more: impl IntoIterator<Item = Builtin>) -> Self {
+        let all = all().chain(more);
+        Table { entries: all.map(|b| ((b.module, b.name), b)).collect() }
+    }
+
+    /// The built-in at an index that [`find`](Table::find) gave.
+    pub fn get(&self, i: u32) -> &Builtin {
+        &self.entries[i as usize]
+    }
+
+    /// The index of a built-in; operators are named as they are written, with `neg` and `not` for the prefix ones.
+    pub fn find(&self, module: &str, name: &str) -> Option<u32> {
+        self.entries.get_index_of(&(module, name)).map(|i| i as u32)
+    }
+
+    /// All of them, in the order of the reference.
+    pub fn iter(&self) -> impl Iterator<Item = &Builtin> {
+        self.entries.values()
+    }
+
+    /// The named constants: `pi`, `inf`.
+    pub fn constants(&self) -> &'static [Constant] {
+        CONSTANTS
+    }
+
+    /// The value of a named constant.
+    pub fn constant(&self, name: &str) -> Option<f64> {
+        CONSTANTS.iter().find(|c| c.name == name).map(|c| c.value)
+    }
+}

@@ -1,0 +1,74 @@
+//! Tests of the built-ins through the table, as a program calls them.
+
+mod lists;
+mod maths;
+mod operators;
+mod table;
+
+use super::{Args, Kind, Table};
+use crate::lang::error::Fault;
+use crate::lang::value::Value;
+use std::sync::LazyLock;
+
+static TABLE: LazyLock<Table> = LazyLock::new(Table::default);
+
+/// Calls a function with arguments by position; `module.name` or `name`.
+pub(super) fn try_call(name: &str, values: &[Value]) -> Result<Value, Fault> {
+    let (module, short) = match name.split_once('.') {
+        Some((m, n)) if !m.is_empty() && !n.is_empty() => (m, n),
+        _ => ("", name),
+    };
+    let index = TABLE.find(module, short).unwrap_or_else(|| panic!("no built-in {name}"));
+    let builtin = TABLE.get(index);
+    let order = builtin.match_names(values.iter().map(|_| None)).map_err(Fault::type_error)?;
+    let values: Vec<&Value> = order.iter().map(|i| i.map_or(&Value::Unit, |i| &values[i])).collect();
+    let args = Args { builtin, values: &values };
+    match builtin.kind {
+        Kind::Function(f) => f(&args),
+        Kind::Distribution(f) => f(&args).map(|d| Value::Dist(d.into())),
+        Kind::Form(_) | Kind::Inference => panic!("{name} is no function"),
+    }
+}
+
+/// The same, of a call that must succeed.
+pub(super) fn call(name: &str, values: &[Value]) -> Value {
+    try_call(name, values).unwrap_or_else(|f| panic!("{name}: {}", f.message))
+}
+
+/// The message, and hint if any, of a call that must fail.
+pub(super) fn fails(name: &str, values: &[Value]) -> String {
+    match try_call(name, values) {
+        Ok(v) => panic!("{name} gave {v}"),
+        Err(Fault { message, hint: Some(hint), .. }) => format!("{message} ({hint})"),
+        Err(f) => f.message,
+    }
+}
+
+pub(super) fn num(x: f64) -> Value {
+    Value::Num(x)
+}
+
+pub(super) fn arr(xs: &[f64]) -> Value {
+    Value::array(xs.to_vec())
+}
+
+pub(super) fn list(xs: &[Value]) -> Value {
+    Value::List(xs.to_vec().into())
+}
+
+pub(super) fn bools(xs: &[bool]) -> Value {
+    Value::List(xs.iter().map(|b| Value::Bool(*b)).collect())
+}
+
+/// Asserts that two values are the same to the last bit.
+#[track_caller]
+pub(super) fn same(got: Value, wanted: Value) {
+    assert!(got.same(&wanted), "got {got}, wanted {wanted}");
+}
+
+/// Asserts that a number is near another.
+#[track_caller]
+pub(super) fn near(got: Value, wanted: f64) {
+    let Value::Num(x) = got else { panic!("got {got}") };
+    assert!((x - wanted).abs() <= 1e-15 * wanted.abs().max(1.0), "got {x}, wanted {wanted}");
+}

@@ -1,0 +1,107 @@
+//! The table itself: look-up, matching of arguments, and what every entry must satisfy.
+
+use super::*;
+use std::collections::HashSet;
+
+fn matched(name: &str, args: &[Option<&str>]) -> Result<Vec<Option<usize>>, String> {
+    let index = TABLE.find("", name).unwrap();
+    TABLE.get(index).match_names(args.iter().copied()).map(|o| o.to_vec())
+}
+
+#[test]
+fn arguments_are_matched_by_position_and_name() {
+    assert_eq!(matched("clamp", &[None, None, None]).unwrap(), [Some(0), Some(1), Some(2)]);
+    assert_eq!(matched("clamp", &[None, Some("hi"), Some("lo")]).unwrap(), [Some(0), Some(2), Some(1)]);
+    assert_eq!(matched("range", &[None, None]).unwrap(), [Some(0), Some(1), None]);
+    assert_eq!(matched("min", &[None, None, None]).unwrap(), [Some(0), Some(1), Some(2)]);
+}
+
+#[test]
+fn mistakes_in_arguments_are_explained() {
+    let wrong = |name, args: &[Option<&str>]| matched(name, args).unwrap_err();
+    assert_eq!(wrong("sqrt", &[None, None]), "`sqrt` takes 1 argument, got 2: sqrt(x)");
+    assert_eq!(wrong("log_joint", &[None]), "`log_joint` takes no arguments, got 1: log_joint()");
+    assert_eq!(wrong("range", &[None]), "`range` needs its argument `end`: range(start, end, step = 1)");
+    assert_eq!(wrong("range", &[None, None, Some("stepp")]), "`range` has no argument `stepp`; did you mean `step`?");
+    assert_eq!(wrong("clamp", &[Some("q")]), "`clamp` has no argument `q`; it takes x, lo, hi");
+    assert_eq!(wrong("prior", &[Some("q")]), "`prior` has no argument `q`; it takes none");
+    assert_eq!(wrong("clamp", &[None, Some("x"), None]), "`clamp` gets its argument `x` twice");
+    assert_eq!(wrong("min", &[]), "`min` needs its argument `x`: min(x, …)");
+}
+
+#[test]
+fn names_are_found_by_module() {
+    assert!(TABLE.find("", "sqrt").is_some());
+    assert!(TABLE.find("", "..").is_some());
+    assert!(TABLE.find("nowhere", "sqrt").is_none());
+    for (i, b) in TABLE.iter().enumerate() {
+        assert_eq!(TABLE.find(b.module, b.name), Some(i as u32));
+    }
+}
+
+/// The words that the grammar keeps for itself: none of them can be written as a name.
+const KEYWORDS: &[&str] = &[
+    "include", "param", "data", "fn", "kernel", "infer", "report", "export", "as", "to", "assume", "let", "observe",
+    "with", "coarse", "predict", "factor", "force", "freeze", "forget", "sample", "for", "in", "if", "else", "warmup",
+    "repeat", "every", "mix", "stop", "when", "collect", "propose", "or", "and", "true", "false",
+];
+
+#[test]
+fn every_entry_is_well_formed() {
+    let mut seen = HashSet::new();
+    let own = crate::lang::builtins::table::all();
+    for b in own {
+        let name = b.full_name();
+        assert!(seen.insert((b.module, b.name)), "{name} is there twice");
+        assert!(!KEYWORDS.contains(&b.name), "{name} is a keyword");
+        assert!(TABLE.constant(b.name).is_none(), "{name} is a constant too");
+        assert!(b.doc.ends_with('.') && !b.section.is_empty(), "{name}: {}", b.doc);
+        let mut names = HashSet::new();
+        let mut optional = false;
+        for a in b.args {
+            assert!(names.insert(a.name), "{name}: {} is there twice", a.name);
+            assert!(!KEYWORDS.contains(&a.name), "{name}: {} is a keyword", a.name);
+            assert!(a.doc.ends_with('.'), "{name}: {}", a.doc);
+            assert!(a.default.is_some() || !optional, "{name}: {} must be given after one that need not be", a.name);
+            optional |= a.default.is_some();
+        }
+        assert!(!b.variadic || !b.args.is_empty(), "{name}");
+    }
+}
+
+#[test]
+fn no_function_panics_on_values_of_any_type() {
+    let values = [
+        Value::Unit,
+        num(2.0),
+        num(f64::NAN),
+        num(-1e308),
+        true.into(),
+        "x".into(),
+        arr(&[]),
+        arr(&[1.0, 2.0]),
+        bools(&[true]),
+        list(&[arr(&[1.0]), "x".into()]),
+        Value::record([("x", num(1.0))]),
+    ];
+    let mut calls = 0;
+    for b in TABLE.iter() {
+        let f = |values: &[&Value]| match b.kind {
+            Kind::Function(f) => f(&Args { builtin: b, values }).map(|_| ()),
+            Kind::Distribution(f) => f(&Args { builtin: b, values }).map(|_| ()),
+            _ => Ok(()),
+        };
+        let _ = f(&[]);
+        for x in &values {
+            let _ = f(&[x]);
+            for y in &values {
+                let _ = f(&[x, y]);
+                for z in &values {
+                    let _ = f(&[x, y, z]);
+                    calls += 1;
+                }
+            }
+        }
+    }
+    assert!(calls > 50_000);
+}
