@@ -515,7 +515,7 @@ impl Runner<'_> {
 
     /// The text of a kernel for tables.
     fn label(&self, e: &Expr) -> String {
-        crate::syntax::print::expr(e)
+        crate::syntax::print_expr(e)
     }
 
     /// `anneal(from)`: raises the power of the likelihood from 1/from to 1 over a warm-up.
