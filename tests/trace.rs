@@ -169,7 +169,7 @@ fn addresses_are_paths() {
         1,
     );
     let expected = [
-        "@a/geom/s", "@a/geom#2/s", "@pose[arm_l]/bone/rot[x]", "@pose[arm_l]/bone/rot[z]", "@pose[leg]/bone/rot[x]",
+        "@a/geom#2/s", "@a/geom/s", "@pose[arm_l]/bone/rot[x]", "@pose[arm_l]/bone/rot[z]", "@pose[leg]/bone/rot[x]",
         "@pose[leg]/bone/rot[z]", "@x[0]", "@x[1]", "@y[0]", "@y[1]",
     ];
     let mut got = addresses(&t);
@@ -229,8 +229,11 @@ fn work_does_not_grow_with_the_trace() {
         let (_, mut t) = trace(&text, 1);
         let all = t.select(&Selector::Kind(pcadlang::trace::ChoiceKind::Discrete));
         let target = t.targets(all)[n / 2];
+        let set = |v| [(target, Change::Set(pcadlang::dist::Datum::Bool(v)))];
+        t.propose(&set(true), at(3)).unwrap();
+        t.commit();
         t.watch();
-        t.regenerate(&[target], at(3)).unwrap();
+        t.propose(&set(false), at(4)).unwrap();
         t.executed().len()
     };
     let few = executed(10);
