@@ -104,7 +104,8 @@ impl Program {
     }
 
     fn new(loaded: Loaded, sources: SourceMap, loader: Box<dyn Loader>) -> Program {
-        let text = loaded.units.first().and_then(|u| sources.get(u.file)).map_or(String::new(), |f| f.text().to_string());
+        let text =
+            loaded.units.first().and_then(|u| sources.get(u.file)).map_or(String::new(), |f| f.text().to_string());
         Program {
             loaded,
             sources,

@@ -84,7 +84,8 @@ fn recursion_against_enumeration() {
     let z: f64 = (0..60).map(|a| weight(f64::from(a))).sum();
     let expected = (0..60).map(|a| f64::from(a) * weight(f64::from(a))).sum::<f64>() / z;
     for kernel in ["mh(one(@**))", "gibbs(one(@**))", "block(@**)", "drift(one(@**))", "mh(one(@a/geom#2))"] {
-        let kernel = if kernel.contains('#') { "mix { 0.5 => mh(one(@a/geom#2)); 0.5 => mh(one(@a/geom)); }" } else { kernel };
+        let kernel =
+            if kernel.contains('#') { "mix { 0.5 => mh(one(@a/geom#2)); 0.5 => mh(one(@a/geom)); }" } else { kernel };
         let k = if kernel.starts_with("mix") { kernel.to_owned() } else { format!("{kernel};") };
         let text = format!(
             "fn geom(p) {{ s ~ flip(p); if s {{ 1 + geom(p) }} else {{ 0 }} }}
@@ -169,7 +170,12 @@ fn open_universe_with_mem() {
     let y = [-1.0, -0.5, 2.0];
     // Marginal density of a group: points given a centre ~ normal(0, 2), noise 1.
     let group = |points: &[f64]| {
-        integrate(|m| normal_pdf(m, 0.0, 2.0) * points.iter().map(|p| normal_pdf(*p, m, 1.0)).product::<f64>(), -15.0, 15.0, 3000)
+        integrate(
+            |m| normal_pdf(m, 0.0, 2.0) * points.iter().map(|p| normal_pdf(*p, m, 1.0)).product::<f64>(),
+            -15.0,
+            15.0,
+            3000,
+        )
     };
     // Chinese restaurant process with alpha = 1 over 3 points: n! denominators.
     let together = group(&y) * 2.0 / 6.0;
@@ -180,7 +186,10 @@ fn open_universe_with_mem() {
     let z = together + first_two + outer + last_two + apart;
     let p01 = (together + first_two) / z;
     let p12 = (together + last_two) / z;
-    for kernel in ["mh(one($discrete)); drift(one($continuous));", "gibbs(one($discrete)); mh(one($continuous)); mh(one($discrete));"] {
+    for kernel in [
+        "mh(one($discrete)); drift(one($continuous));",
+        "gibbs(one($discrete)); mh(one($continuous)); mh(one($discrete));",
+    ] {
         let text = format!(
             "let y = [-1, -0.5, 2];
              assume stick = mem(fn(k) {{ v ~ beta(1, 1); v }});

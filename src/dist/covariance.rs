@@ -64,7 +64,10 @@ impl Covariance {
     /// # Errors
     /// As [`Covariance::sq_exp`].
     pub fn matern32(length: f64, sd: f64) -> Result<Self, ParamError> {
-        Ok(Covariance::Matern32 { length: positive("matern32", "length", length)?, sd: positive("matern32", "sd", sd)? })
+        Ok(Covariance::Matern32 {
+            length: positive("matern32", "length", length)?,
+            sd: positive("matern32", "sd", sd)?,
+        })
     }
 
     /// Matérn 5/2.
@@ -72,7 +75,10 @@ impl Covariance {
     /// # Errors
     /// As [`Covariance::sq_exp`].
     pub fn matern52(length: f64, sd: f64) -> Result<Self, ParamError> {
-        Ok(Covariance::Matern52 { length: positive("matern52", "length", length)?, sd: positive("matern52", "sd", sd)? })
+        Ok(Covariance::Matern52 {
+            length: positive("matern52", "length", length)?,
+            sd: positive("matern52", "sd", sd)?,
+        })
     }
 
     /// Periodic.

@@ -18,7 +18,8 @@ pub enum Datum {
 impl Datum {
     /// The smallest form of a list: numbers become a vector.
     pub fn from_elements(xs: Vec<Datum>) -> Datum {
-        let numbers: Option<Arc<[f64]>> = xs.iter().map(|x| if let Datum::Num(x) = x { Some(*x) } else { None }).collect();
+        let numbers: Option<Arc<[f64]>> =
+            xs.iter().map(|x| if let Datum::Num(x) = x { Some(*x) } else { None }).collect();
         match numbers {
             Some(v) => Datum::Vec(v),
             None => Datum::List(xs.into()),

@@ -66,10 +66,7 @@ impl Distribution for Gamma {
         }
         Some(Gradient {
             x: vec![(self.shape - 1.0) / x - self.rate],
-            params: vec![
-                libm::log(self.rate) - digamma(self.shape) + libm::log(x),
-                self.shape / self.rate - x,
-            ],
+            params: vec![libm::log(self.rate) - digamma(self.shape) + libm::log(x), self.shape / self.rate - x],
         })
     }
 }

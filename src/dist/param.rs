@@ -41,9 +41,5 @@ pub(super) fn positive(distribution: &'static str, parameter: &'static str, x: f
 
 /// Checks that a parameter is a probability.
 pub(super) fn probability(distribution: &'static str, parameter: &'static str, x: f64) -> Result<f64, ParamError> {
-    if (0.0..=1.0).contains(&x) {
-        Ok(x)
-    } else {
-        Err(ParamError::new(distribution, parameter, "between 0 and 1", x))
-    }
+    if (0.0..=1.0).contains(&x) { Ok(x) } else { Err(ParamError::new(distribution, parameter, "between 0 and 1", x)) }
 }

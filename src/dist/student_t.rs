@@ -75,7 +75,8 @@ impl Distribution for StudentT {
             return None;
         }
         let slope = -(v + 1.0) * z / (v + q) / self.scale;
-        let by_df = 0.5 * (digamma(0.5 * (v + 1.0)) - digamma(0.5 * v) - 1.0 / v - ln_tail(z, v) + (v + 1.0) * q / (v * (v + q)));
+        let by_df = 0.5
+            * (digamma(0.5 * (v + 1.0)) - digamma(0.5 * v) - 1.0 / v - ln_tail(z, v) + (v + 1.0) * q / (v * (v + q)));
         Some(Gradient { x: vec![slope], params: vec![by_df, -slope, -1.0 / self.scale - slope * z] })
     }
 }

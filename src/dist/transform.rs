@@ -32,10 +32,18 @@ impl Support {
             }
             (Support::Vector(_), Datum::Vec(v)) => out.extend_from_slice(v),
             (Support::Repeat(s, n), x) => {
-                (0..*n).for_each(|i| if let Some(e) = x.element(i) { s.to_free(&e, out) });
+                (0..*n).for_each(|i| {
+                    if let Some(e) = x.element(i) {
+                        s.to_free(&e, out)
+                    }
+                });
             }
             (Support::Product(s), x) => {
-                s.iter().enumerate().for_each(|(i, s)| if let Some(e) = x.element(i) { s.to_free(&e, out) });
+                s.iter().enumerate().for_each(|(i, s)| {
+                    if let Some(e) = x.element(i) {
+                        s.to_free(&e, out)
+                    }
+                });
             }
             (_, Datum::Num(x)) if self.free_dim() == 1 => out.push(self.to_free_number(*x)),
             _ => {}

@@ -186,7 +186,13 @@ impl Loading<'_> {
                 _ => None,
             })
             .collect();
-        self.loaded.units.push(Unit { file, folder: folder.clone(), path: path.to_owned(), program, includes: Vec::new() });
+        self.loaded.units.push(Unit {
+            file,
+            folder: folder.clone(),
+            path: path.to_owned(),
+            program,
+            includes: Vec::new(),
+        });
         self.stack.push(path.to_owned());
         let includes = wanted.into_iter().map(|w| w.and_then(|(p, span)| self.include(&folder, &p, span))).collect();
         self.stack.pop();

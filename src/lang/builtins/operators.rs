@@ -2,8 +2,8 @@
 //!
 //! Numbers follow IEEE 754: division by zero gives an infinity or NaN, which is caught where it is scored.
 
-use super::covariance::CovarianceValue;
 use super::args::MAX_ELEMENTS;
+use super::covariance::CovarianceValue;
 use super::elementwise::{array, array_len, broadcast, numeric, unary};
 use super::{Arg, Args, Builtin, Type, arg, function};
 use crate::lang::error::Fault;

@@ -138,9 +138,7 @@ impl Lowerer<'_> {
     }
 
     fn written(&mut self, args: &[Arg]) -> Vec<(Option<Arc<str>>, Typed, Span)> {
-        args.iter()
-            .map(|a| (a.name.as_ref().map(|n| Arc::clone(&n.node)), self.expr(&a.value), a.value.span))
-            .collect()
+        args.iter().map(|a| (a.name.as_ref().map(|n| Arc::clone(&n.node)), self.expr(&a.value), a.value.span)).collect()
     }
 
     /// The arguments of a built-in in the table's order.
@@ -149,7 +147,8 @@ impl Lowerer<'_> {
         let order = match b.match_names(args.iter().map(|a| a.name.as_ref().map(|n| &*n.node))) {
             Ok(order) => order,
             Err(message) => {
-                let at = args.iter().filter_map(|a| a.name.as_ref()).find(|n| !b.args.iter().any(|p| p.name == &*n.node));
+                let at =
+                    args.iter().filter_map(|a| a.name.as_ref()).find(|n| !b.args.iter().any(|p| p.name == &*n.node));
                 let at = at.map_or(span, |n| n.span);
                 self.error(message, at, "in this call");
                 self.written(args);
@@ -164,13 +163,8 @@ impl Lowerer<'_> {
                 Some(j) => {
                     let v = values[*j];
                     if !accepts(arg.ty, v.ty) {
-                        let message = format!(
-                            "{}: `{}` must be {}, got {}",
-                            b.full_name(),
-                            arg.name,
-                            shown(arg.ty),
-                            shown(v.ty)
-                        );
+                        let message =
+                            format!("{}: `{}` must be {}, got {}", b.full_name(), arg.name, shown(arg.ty), shown(v.ty));
                         let e = self.error(message, args[*j].value.span, format!("this is {}", shown(v.ty)));
                         e.hint_also(b.signature());
                     }
@@ -280,7 +274,8 @@ impl Lowerer<'_> {
             }
         }
         if let Some(p) = (0..required).find(|p| !given[*p]) {
-            self.error(format!("`{name}` needs its argument `{}`", params[p]), span, "in this call").hint_also(signature);
+            self.error(format!("`{name}` needs its argument `{}`", params[p]), span, "in this call")
+                .hint_also(signature);
         }
     }
 }

@@ -70,7 +70,9 @@ impl Lowerer<'_> {
             0
         } else {
             let n = loops.len();
-            keys.iter().filter_map(|k| loop_of(k)).fold(0u32, |bits, i| bits | 1u32.checked_shl((n - 1 - i) as u32).unwrap_or(0))
+            keys.iter()
+                .filter_map(|k| loop_of(k))
+                .fold(0u32, |bits, i| bits | 1u32.checked_shl((n - 1 - i) as u32).unwrap_or(0))
         };
         let own: Box<[Operand]> = if plain { Box::default() } else { operands.clone().into() };
         let site = self.site(&name.node, tags, carried);

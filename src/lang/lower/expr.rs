@@ -116,7 +116,8 @@ impl Lowerer<'_> {
 
     pub fn only_in_plans(&mut self, name: &str, span: Span) {
         let message = format!("`{name}` belongs in an inference block");
-        self.error(message, span, "not a function of the model").hint_also(format!("infer {{ repeat 1000 {{ {name}(…); }} }}"));
+        self.error(message, span, "not a function of the model")
+            .hint_also(format!("infer {{ repeat 1000 {{ {name}(…); }} }}"));
     }
 
     /// A name nobody knows.
@@ -142,7 +143,9 @@ impl Lowerer<'_> {
         if let Some(at) = later {
             e.point_at(at, "bound later");
         }
-        if let Some(hint) = inside.map(|i| format!("did you mean `{i}`?")).or(near.map(|n| format!("did you mean `{n}`?"))).or(lives) {
+        if let Some(hint) =
+            inside.map(|i| format!("did you mean `{i}`?")).or(near.map(|n| format!("did you mean `{n}`?"))).or(lives)
+        {
             e.hint_also(hint);
         }
     }
@@ -184,7 +187,10 @@ impl Lowerer<'_> {
         let mut value = self.expr(base);
         for k in keys {
             let key = self.expr(k);
-            if matches!(value.ty, Type::Num | Type::Int | Type::Bool | Type::Str | Type::Dist | Type::Function | Type::Likelihood) {
+            if matches!(
+                value.ty,
+                Type::Num | Type::Int | Type::Bool | Type::Str | Type::Dist | Type::Function | Type::Likelihood
+            ) {
                 let message = format!("{} has no elements", shown(value.ty));
                 self.error(message, e.span, "cannot be indexed");
                 return self.nothing();
@@ -202,7 +208,10 @@ impl Lowerer<'_> {
             return self.member(ns, space.module, field, e.span);
         }
         let value = self.expr(base);
-        if matches!(value.ty, Type::Num | Type::Int | Type::Bool | Type::Str | Type::Array | Type::Dist | Type::Function) {
+        if matches!(
+            value.ty,
+            Type::Num | Type::Int | Type::Bool | Type::Str | Type::Array | Type::Dist | Type::Function
+        ) {
             let message = format!("{} has no field `{}`", shown(value.ty), field.node);
             self.error(message, field.span, format!("this is asked of {}", shown(value.ty)));
             return self.nothing();

@@ -40,7 +40,8 @@ impl Lowerer<'_> {
                             let old = self.modules[self.module].namespaces.insert(Arc::clone(&alias.node), space);
                             if let Some(old) = old {
                                 let message = format!("the namespace `{}` is used twice", alias.node);
-                                self.error(message, alias.span, "used again here").point_at(old.span, "first used here");
+                                self.error(message, alias.span, "used again here")
+                                    .point_at(old.span, "first used here");
                             }
                             let outer = std::mem::replace(&mut self.module, module);
                             self.unit(included);

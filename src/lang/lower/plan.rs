@@ -248,7 +248,8 @@ impl Lowerer<'_> {
                             return self.inference_args(&b, args, e.span, around);
                         }
                         Some(b) => {
-                            if let Err(message) = b.match_names(args.iter().map(|a| a.name.as_ref().map(|n| &*n.node))) {
+                            if let Err(message) = b.match_names(args.iter().map(|a| a.name.as_ref().map(|n| &*n.node)))
+                            {
                                 self.error(message, e.span, "in this call");
                             }
                         }
