@@ -209,5 +209,6 @@ mod tests {
         assert_eq!(bits, GOLDEN, "{bits:#x?}");
     }
 
-    const GOLDEN: [u64; 4] = [0, 0, 0, 0];
+    const GOLDEN: [u64; 4] =
+        [0xbfd9_147c_3b1d_ce9e, 0xbffc_04db_b225_6d9a, 0x3fda_26ea_9e14_562a, 0xbfd2_00e3_4a50_0ee6];
 }

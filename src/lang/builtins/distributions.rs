@@ -79,7 +79,7 @@ pub(super) const TABLE: &[Builtin] = &[
         "gp",
         &[
             arg("mean", Type::Nums, "The mean: one number, or one for each point."),
-            arg("cov", Type::Covariance, "The covariance function: `sq_exp(length)`, …"),
+            arg("cov", Type::Covariance, "The covariance function, such as `sq_exp(length)`."),
             arg("at", Type::Array, "The points."),
             opt("centred", Type::Bool, "false", "Stores the values, instead of the white noise that makes them."),
         ],

@@ -1,0 +1,48 @@
+//! The module `scene`: shapes, placements, cameras, and the likelihoods that compare a view with what was observed.
+//!
+//! A thin layer: geometry, rendering and comparison are the business of [`crate::geom`], [`crate::render`] and
+//! [`crate::vision`]; here their values become values of the language.
+
+mod compare;
+mod objects;
+mod observed;
+mod seeing;
+mod shapes;
+
+pub use objects::{AffineValue, CameraValue, SolidValue, ViewValue};
+pub use observed::{DepthValue, ImageValue, MaskValue};
+
+use super::{Arg, Args, Builtin, Kind, Type};
+use crate::geom::GeomError;
+use crate::lang::error::{Fault, FaultKind};
+use crate::lang::value::Value;
+
+const SOLID: Type = Type::Object("a solid");
+const AFFINE: Type = Type::Object("a placement");
+const CAMERA: Type = Type::Object("a camera");
+const VIEW: Type = Type::Object("a view");
+
+/// A pure function of the module.
+const fn native(
+    name: &'static str,
+    section: &'static str,
+    args: &'static [Arg],
+    returns: Type,
+    doc: &'static str,
+    f: fn(&Args) -> Result<Value, Fault>,
+) -> Builtin {
+    Builtin { name, module: "scene", section, args, variadic: false, returns, doc, kind: Kind::Function(f) }
+}
+
+/// All of them.
+pub(super) fn all() -> impl Iterator<Item = Builtin> {
+    [shapes::TABLE, seeing::TABLE, compare::TABLE].into_iter().flatten().copied()
+}
+
+/// A shape that cannot be made: numbers outside their domain reject a proposal, anything else ends the run.
+fn fault(e: GeomError) -> Fault {
+    match e {
+        GeomError::Domain(m) => Fault::domain(m),
+        GeomError::Invalid(m) => Fault::new(FaultKind::Other, m),
+    }
+}

@@ -1,0 +1,98 @@
+//! Scene values as objects of the language.
+
+use crate::geom::{Affine, Solid};
+use crate::lang::index::xyz;
+use crate::lang::value::{Object, Value};
+use crate::render::{Camera, View};
+use std::any::Any;
+use std::sync::Arc;
+
+/// A solid.
+#[derive(Clone, Debug)]
+pub struct SolidValue(pub Solid);
+
+impl Object for SolidValue {
+    fn type_name(&self) -> &'static str {
+        "a solid"
+    }
+
+    fn as_any(&self) -> &dyn Any {
+        self
+    }
+
+    fn field(&self, name: &str) -> Option<Value> {
+        let bounds = || self.0.bounds();
+        match name {
+            "size" => bounds().map(|b| Value::array(b.size().to_array())),
+            "height" => bounds().map(|b| Value::Num(b.size().y)),
+            _ => None,
+        }
+    }
+}
+
+/// A placement.
+#[derive(Clone, Debug)]
+pub struct AffineValue(pub Affine);
+
+impl Object for AffineValue {
+    fn type_name(&self) -> &'static str {
+        "a placement"
+    }
+
+    fn as_any(&self) -> &dyn Any {
+        self
+    }
+
+    /// A placement of a solid is a solid, of a placement a placement: first the right one, then the left one.
+    fn multiply(&self, other: &Value) -> Option<Result<Value, String>> {
+        if let Some(s) = other.downcast::<SolidValue>() {
+            return Some(Ok(Value::object(SolidValue(s.0.placed(self.0)))));
+        }
+        let other = other.downcast::<AffineValue>()?;
+        Some(Ok(Value::object(AffineValue(self.0 * other.0))))
+    }
+
+    fn field(&self, name: &str) -> Option<Value> {
+        (name == "translate").then(|| xyz(self.0.0.translation.to_array()))
+    }
+}
+
+/// A camera.
+#[derive(Clone, Debug)]
+pub struct CameraValue(pub Camera);
+
+impl Object for CameraValue {
+    fn type_name(&self) -> &'static str {
+        "a camera"
+    }
+
+    fn as_any(&self) -> &dyn Any {
+        self
+    }
+
+    fn summary(&self) -> Option<String> {
+        Some(format!("{} x {} pixels", self.0.width, self.0.height))
+    }
+}
+
+/// A solid before a camera.
+#[derive(Clone, Debug)]
+pub struct ViewValue(pub Arc<View>);
+
+impl Object for ViewValue {
+    fn type_name(&self) -> &'static str {
+        "a view"
+    }
+
+    fn as_any(&self) -> &dyn Any {
+        self
+    }
+
+    fn field(&self, name: &str) -> Option<Value> {
+        match name {
+            "solid" => Some(Value::object(SolidValue(self.0.solid().clone()))),
+            "camera" => Some(Value::object(CameraValue(*self.0.camera()))),
+            _ => None,
+        }
+    }
+}

@@ -1,0 +1,151 @@
+//! What is observed: photographs and ready contour maps, masks, depth maps. What comparators prepare from them alone is made
+//! once, on first use, and kept beside them.
+
+use crate::lang::value::{Object, Value};
+use crate::vision::{
+    Chamfer, ChamferOptions, ContourDetector, ContourMap, ContourRatio, ContourRatioOptions, DepthLikelihood, DepthMap,
+    GradientDetector, Mask, MaskLikelihood, Photo,
+};
+use std::any::Any;
+use std::sync::{Arc, Mutex, OnceLock, PoisonError};
+
+/// Prepared things by what they were prepared for; few are ever asked for.
+#[derive(Debug)]
+pub(super) struct Prepared<K, T>(Mutex<Vec<(K, Arc<T>)>>);
+
+impl<K, T> Default for Prepared<K, T> {
+    fn default() -> Self {
+        Prepared(Mutex::default())
+    }
+}
+
+impl<K: PartialEq, T> Prepared<K, T> {
+    /// The one for a key, made if it is new.
+    pub fn get(&self, key: K, make: impl FnOnce(&K) -> Result<T, String>) -> Result<Arc<T>, String> {
+        let mut all = self.0.lock().unwrap_or_else(PoisonError::into_inner);
+        if let Some((_, t)) = all.iter().find(|(k, _)| *k == key) {
+            return Ok(Arc::clone(t));
+        }
+        let made = Arc::new(make(&key)?);
+        all.push((key, Arc::clone(&made)));
+        Ok(made)
+    }
+}
+
+/// Options and the size of the frame.
+type Key<O> = (O, u32, u32);
+
+/// A photograph, a ready contour map, or both.
+#[derive(Debug, Default)]
+pub struct ImageValue {
+    photo: Option<Photo>,
+    map: OnceLock<ContourMap>,
+    pub(super) ratios: Prepared<Key<ContourRatioOptions>, ContourRatio>,
+    pub(super) chamfers: Prepared<Key<ChamferOptions>, Chamfer>,
+}
+
+impl ImageValue {
+    /// A photograph; its contours are found when they are needed.
+    pub fn photo(photo: Photo) -> Self {
+        ImageValue { photo: Some(photo), ..ImageValue::default() }
+    }
+
+    /// A ready contour map, with the photograph if there is one.
+    pub fn contours(map: ContourMap, photo: Option<Photo>) -> Self {
+        ImageValue { photo, map: OnceLock::from(map), ..ImageValue::default() }
+    }
+
+    /// The photograph.
+    pub fn as_photo(&self) -> Option<&Photo> {
+        self.photo.as_ref()
+    }
+
+    /// Its contours.
+    pub fn map(&self) -> &ContourMap {
+        self.map.get_or_init(|| match &self.photo {
+            Some(photo) => GradientDetector::default().detect(photo),
+            None => ContourMap::default(),
+        })
+    }
+
+    /// Width and height in pixels.
+    pub fn size(&self) -> (u32, u32) {
+        match &self.photo {
+            Some(p) => (p.width(), p.height()),
+            None => (self.map().width, self.map().height),
+        }
+    }
+}
+
+impl Object for ImageValue {
+    fn type_name(&self) -> &'static str {
+        "an image"
+    }
+
+    fn as_any(&self) -> &dyn Any {
+        self
+    }
+
+    fn field(&self, name: &str) -> Option<Value> {
+        match name {
+            "width" => Some(Value::Num(f64::from(self.size().0))),
+            "height" => Some(Value::Num(f64::from(self.size().1))),
+            _ => None,
+        }
+    }
+
+    fn summary(&self) -> Option<String> {
+        let (w, h) = self.size();
+        Some(format!("{w} x {h} pixels"))
+    }
+}
+
+/// An observed mask.
+#[derive(Debug)]
+pub struct MaskValue {
+    /// The mask.
+    pub mask: Mask,
+    pub(super) prepared: Prepared<Key<[f64; 2]>, MaskLikelihood>,
+}
+
+impl MaskValue {
+    /// A mask.
+    pub fn new(mask: Mask) -> Self {
+        MaskValue { mask, prepared: Prepared::default() }
+    }
+}
+
+impl Object for MaskValue {
+    fn type_name(&self) -> &'static str {
+        "a mask"
+    }
+
+    fn as_any(&self) -> &dyn Any {
+        self
+    }
+}
+
+/// An observed depth map.
+#[derive(Debug)]
+pub struct DepthValue {
+    /// The depth map.
+    pub depth: DepthMap,
+    pub(super) prepared: Prepared<Key<[f64; 3]>, DepthLikelihood>,
+}
+
+impl DepthValue {
+    /// A depth map.
+    pub fn new(depth: DepthMap) -> Self {
+        DepthValue { depth, prepared: Prepared::default() }
+    }
+}
+
+impl Object for DepthValue {
+    fn type_name(&self) -> &'static str {
+        "a depth map"
+    }
+
+    fn as_any(&self) -> &dyn Any {
+        self
+    }
+}

@@ -1,0 +1,67 @@
+//! Cameras and views.
+
+use super::{CAMERA, CameraValue, SOLID, SolidValue, VIEW, ViewValue, native};
+use super::shapes::vector;
+use crate::lang::builtins::{Builtin, Type, arg, opt};
+use crate::lang::error::Fault;
+use crate::lang::value::Value;
+use crate::render::{Camera, Projection, View};
+use glam::DVec3;
+use std::sync::Arc;
+
+const SECTION: &str = "Seeing";
+
+pub(super) const TABLE: &[Builtin] = &[
+    native(
+        "camera",
+        SECTION,
+        &[
+            opt("position", Type::Array, "[0, 0, 8]", "Where it stands.").unit("scene units"),
+            opt("look_at", Type::Array, "[0, 0, 0]", "A point in the middle of its picture.").unit("scene units"),
+            opt("up", Type::Array, "[0, 1, 0]", "A direction that points up in its picture."),
+            opt("focal", Type::Num, "1.818", "The focal length as a multiple of the picture's longer side."),
+            opt("width", Type::Int, "256", "The width of its picture.").unit("pixels"),
+            opt("height", Type::Int, "256", "The height of its picture.").unit("pixels"),
+        ],
+        CAMERA,
+        "A pinhole camera. Without one, a view uses the camera of the run: `--camera`, or the default view.",
+        |a| {
+            let eye = vector(a, 0, DVec3::new(0.0, 0.0, 8.0))?;
+            let target = vector(a, 1, DVec3::ZERO)?;
+            let up = vector(a, 2, DVec3::Y)?;
+            let focal = a.positive_or(3, 8.0 / 4.4)?;
+            let side = |i: usize| if a.given(i) { a.int_in(i, 1, 16384) } else { Ok(256) };
+            let (width, height) = (side(4)? as u32, side(5)? as u32);
+            let forward = (target - eye).try_normalize();
+            let right = forward.and_then(|f| f.cross(up).try_normalize());
+            let (Some(forward), Some(right)) = (forward, right) else {
+                return Err(Fault::domain("scene.camera: it must look somewhere, and not along `up`"));
+            };
+            let projection = Projection::Pinhole {
+                focal_px: focal * f64::from(width.max(height)),
+                cx: f64::from(width) / 2.0,
+                cy: f64::from(height) / 2.0,
+            };
+            let up = right.cross(forward);
+            Ok(Value::object(CameraValue(Camera { eye, right, up, forward, width, height, projection })))
+        },
+    ),
+    native(
+        "render",
+        SECTION,
+        &[
+            arg("solid", SOLID, "What is seen."),
+            opt("camera", CAMERA, "the run's", "The camera; without one, that of the run."),
+        ],
+        VIEW,
+        "A solid before a camera. Nothing is drawn before a likelihood or a report looks.",
+        |a| {
+            let solid = a.object::<SolidValue>(0, "a solid")?;
+            let camera = match a.given(1) {
+                true => a.object::<CameraValue>(1, "a camera")?.0,
+                false => Camera::default_for(256, 256),
+            };
+            Ok(Value::object(ViewValue(Arc::new(View::new(solid.0.clone(), camera)))))
+        },
+    ),
+];

@@ -1,0 +1,150 @@
+//! Shapes and placements.
+
+use super::{AFFINE, AffineValue, SOLID, SolidValue, fault, native};
+use crate::geom::{Affine, Caps, Profile, Solid, cuboid, lathe, sphere};
+use crate::lang::builtins::{Args, Builtin, Type, arg, opt};
+use crate::lang::error::Fault;
+use crate::lang::value::Value;
+use glam::DVec3;
+use std::sync::Arc;
+
+const SECTION: &str = "Shapes";
+
+pub(super) const TABLE: &[Builtin] = &[
+    native(
+        "lathe",
+        SECTION,
+        &[
+            arg("parts", Type::Any, "A profile `{ y: heights, r: radii }`, or an array of them, from the bottom up.").unit("scene units"),
+            opt("sides", Type::Int, "48", "The number of flat sides, 3 to 1024."),
+            opt("thickness", Type::Num, "0", "Of the wall, for a vessel open at the top; 0 for a full body.").unit("scene units"),
+            opt("caps", Type::Str, "\"both\"", "Which ends are closed: \"both\", \"bottom\", \"top\" or \"none\"."),
+        ],
+        SOLID,
+        "Profiles stacked and swept round the y axis; a step from one to the next is closed by a ring.",
+        |a| {
+            let profiles = profiles(a)?;
+            let sides = if a.given(1) { a.int_in(1, 3, 1024)? as u32 } else { 48 };
+            let caps = match a.choice(3, &["both", "bottom", "top", "none"])? {
+                "bottom" => Caps::Bottom,
+                "top" => Caps::Top,
+                "none" => Caps::None,
+                _ => Caps::Both,
+            };
+            lathe(&profiles, sides, a.num_or(2, 0.0)?, caps).map(solid).map_err(fault)
+        },
+    ),
+    native(
+        "sphere",
+        SECTION,
+        &[
+            arg("radius", Type::Num, "The radius.").unit("scene units"),
+            opt("sides", Type::Int, "32", "The number of meridians, 4 to 1024."),
+        ],
+        SOLID,
+        "A sphere round the origin.",
+        |a| {
+            let sides = if a.given(1) { a.int_in(1, 4, 1024)? as u32 } else { 32 };
+            sphere(a.num(0)?, sides).map(solid).map_err(fault)
+        },
+    ),
+    native(
+        "box",
+        SECTION,
+        &[arg("size", Type::Nums, "The three edge lengths, or one for a cube.").unit("scene units")],
+        SOLID,
+        "A box round the origin.",
+        |a| cuboid(vector(a, 0, DVec3::ONE)?).map(solid).map_err(fault),
+    ),
+    native(
+        "group",
+        SECTION,
+        &[arg("solids", Type::Array, "The solids.")],
+        SOLID,
+        "Several solids as one.",
+        |a| {
+            let n = a.get(0).len().unwrap_or(0);
+            let members = (0..n).map(|i| {
+                let v = a.get(0).element(i).unwrap_or_default();
+                v.downcast::<SolidValue>().map(|s| s.0.clone()).ok_or_else(|| a.element_wrong(0, "an array of solids", &v))
+            });
+            let members = members.collect::<Result<Vec<_>, _>>()?;
+            if members.is_empty() {
+                return Err(a.wrong(0, "an array of solids"));
+            }
+            Ok(Value::object(SolidValue(Solid::group(&members))))
+        },
+    ),
+    native(
+        "centred",
+        SECTION,
+        &[
+            arg("solid", SOLID, "A solid."),
+            opt("fit", Type::Bool, "false", "Also scales it so that the longest edge of its box is 2."),
+        ],
+        SOLID,
+        "Moved so that the centre of its box is the origin.",
+        |a| {
+            let s = a.object::<SolidValue>(0, "a solid")?;
+            Ok(Value::object(SolidValue(s.0.centred(a.bool_or(1, false)?))))
+        },
+    ),
+    native(
+        "affine",
+        SECTION,
+        &[
+            opt("translate", Type::Array, "[0, 0, 0]", "The shift.").unit("scene units"),
+            opt("rotate", Type::Array, "[0, 0, 0]", "The turns round x, then y, then z.").unit("radians"),
+            opt("scale", Type::Nums, "1", "The sizes along the axes, or one for all."),
+        ],
+        AFFINE,
+        "A placement p' = T Rz Ry Rx S p; `placement * solid` puts a solid there, and placements multiply.",
+        |a| {
+            let placed = Affine::new(vector(a, 0, DVec3::ZERO)?, vector(a, 1, DVec3::ZERO)?, vector(a, 2, DVec3::ONE)?);
+            if !placed.is_finite() {
+                return Err(Fault::domain("scene.affine: its numbers must be finite"));
+            }
+            Ok(Value::object(AffineValue(placed)))
+        },
+    ),
+];
+
+fn solid(mesh: crate::geom::Mesh) -> Value {
+    Value::object(SolidValue(Solid::new(Arc::new(mesh))))
+}
+
+/// Three numbers, or one for all; a default where left out.
+pub(super) fn vector(a: &Args, i: usize, default: DVec3) -> Result<DVec3, Fault> {
+    match a.get(i) {
+        Value::Unit => Ok(default),
+        Value::Num(x) => Ok(DVec3::splat(*x)),
+        _ => match a.array(i)?[..] {
+            [x, y, z] => Ok(DVec3::new(x, y, z)),
+            _ => Err(a.wrong_length(i, "3 numbers")),
+        },
+    }
+}
+
+/// One profile or an array of them.
+fn profiles(a: &Args) -> Result<Vec<Profile>, Fault> {
+    let wanted = "profiles such as { y: [0, 1], r: [0.5, 0.4] }";
+    let one = |v: &Value| {
+        let Value::Record(record) = v else { return Err(a.element_wrong(0, wanted, v)) };
+        let numbers = |name: &str| match record.get(name) {
+            Some(Value::Array(xs)) => Ok(xs.to_vec()),
+            Some(Value::Num(x)) => Ok(vec![*x]),
+            Some(v) => Err(a.element_wrong(0, wanted, v)),
+            None => Err(Fault::type_error(format!("scene.lathe: a profile needs the field `{name}`: {wanted}"))),
+        };
+        let (y, mut r) = (numbers("y")?, numbers("r")?);
+        if r.len() == 1 {
+            r.resize(y.len(), r[0]);
+        }
+        Ok(Profile { y, r })
+    };
+    match a.get(0) {
+        v @ Value::Record(_) => Ok(vec![one(v)?]),
+        Value::List(all) => all.iter().map(one).collect(),
+        _ => Err(a.wrong(0, wanted)),
+    }
+}
