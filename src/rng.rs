@@ -60,8 +60,7 @@ fn philox(mut counter: [u64; 4], mut key: [u64; 2]) -> [u64; 4] {
         }
         let a = u128::from(counter[0]) * 0xD2E7_470E_E14C_6C93;
         let b = u128::from(counter[2]) * 0xCA5A_8263_9512_1157;
-        counter =
-            [(b >> 64) as u64 ^ counter[1] ^ key[0], b as u64, (a >> 64) as u64 ^ counter[3] ^ key[1], a as u64];
+        counter = [(b >> 64) as u64 ^ counter[1] ^ key[0], b as u64, (a >> 64) as u64 ^ counter[3] ^ key[1], a as u64];
     }
     counter
 }

@@ -6,9 +6,10 @@ use common::*;
 /// x ~ normal(0, 1), observe normal(x, 0.5) = 2: mean 1.600, variance 0.200. (Leaving the prior out of the ratio, as an
 /// early engine did, gives 1.333 and 0.167.)
 fn conjugate_normal(kernel: &str) {
+    let stmt = if kernel.ends_with('}') { kernel.to_owned() } else { format!("{kernel};") };
     let text = format!(
         "assume x ~ normal(0, 1); observe normal(x, 0.5) = 2;
-         infer {{ warmup 2000 {{ {kernel}; }} repeat 60000 {{ {kernel}; collect x; }} }}"
+         infer {{ warmup 2000 {{ {stmt} }} repeat 60000 {{ {stmt} collect x; }} }}"
     );
     let d = run(&text, 1, 2);
     assert_mean(kernel, &d["x"], 1.6, 0.06);
@@ -38,7 +39,7 @@ fn conjugate_normal_by_elliptical() {
 
 #[test]
 fn conjugate_normal_by_a_mixture_of_kernels() {
-    conjugate_normal("mix { 0.3 => mh(@x); 0.3 => drift(@x); 0.4 => elliptical(@x); }".trim_end_matches(';'));
+    conjugate_normal("mix { 0.3 => mh(@x); 0.3 => drift(@x); 0.4 => elliptical(@x); }");
 }
 
 /// The default plan, nothing collected by hand.
@@ -71,7 +72,7 @@ fn support_that_depends_on_another_choice() {
              infer {{ warmup 2000 {{ {kernel}; }} repeat 60000 {{ {kernel}; collect p1, p2; }} }}"
         );
         let d = run(&text, 7, 2);
-        assert_mean(&format!("{kernel}: p1"), &d["p1"], m1, 0.02);
+        assert_mean(&format!("{kernel}: p1"), &d["p1"], m1, 0.03);
         assert_mean(&format!("{kernel}: p2"), &d["p2"], m2, 0.03);
     }
 }
@@ -83,7 +84,8 @@ fn recursion_against_enumeration() {
     let z: f64 = (0..60).map(|a| weight(f64::from(a))).sum();
     let expected = (0..60).map(|a| f64::from(a) * weight(f64::from(a))).sum::<f64>() / z;
     for kernel in ["mh(one(@**))", "gibbs(one(@**))", "block(@**)", "drift(one(@**))", "mh(one(@a/geom#2))"] {
-        let kernel = if kernel.contains('#') { "mix { 0.5 => mh(one(@a/geom#2)); 0.5 => mh(one(@a/geom)); }" } else { kernel };
+        let kernel =
+            if kernel.contains('#') { "mix { 0.5 => mh(one(@a/geom#2)); 0.5 => mh(one(@a/geom)); }" } else { kernel };
         let k = if kernel.starts_with("mix") { kernel.to_owned() } else { format!("{kernel};") };
         let text = format!(
             "fn geom(p) {{ s ~ flip(p); if s {{ 1 + geom(p) }} else {{ 0 }} }}
@@ -157,7 +159,7 @@ fn hidden_markov_model() {
         );
         let d = run(&text, 17, 2);
         for (t, e) in exact.iter().enumerate() {
-            assert_mean(&format!("{kernel} s[{t}]"), &d[&format!("s.{}", t + 1)], *e, 0.1);
+            assert_mean(&format!("{kernel} s[{t}]"), &d[&format!("s[{t}]")], *e, 0.1);
         }
     }
 }
@@ -168,7 +170,12 @@ fn open_universe_with_mem() {
     let y = [-1.0, -0.5, 2.0];
     // Marginal density of a group: points given a centre ~ normal(0, 2), noise 1.
     let group = |points: &[f64]| {
-        integrate(|m| normal_pdf(m, 0.0, 2.0) * points.iter().map(|p| normal_pdf(*p, m, 1.0)).product::<f64>(), -15.0, 15.0, 3000)
+        integrate(
+            |m| normal_pdf(m, 0.0, 2.0) * points.iter().map(|p| normal_pdf(*p, m, 1.0)).product::<f64>(),
+            -15.0,
+            15.0,
+            3000,
+        )
     };
     // Chinese restaurant process with alpha = 1 over 3 points: n! denominators.
     let together = group(&y) * 2.0 / 6.0;
@@ -179,7 +186,10 @@ fn open_universe_with_mem() {
     let z = together + first_two + outer + last_two + apart;
     let p01 = (together + first_two) / z;
     let p12 = (together + last_two) / z;
-    for kernel in ["mh(one($discrete)); drift(one($continuous));", "gibbs(one($discrete)); mh(one($continuous)); mh(one($discrete));"] {
+    for kernel in [
+        "mh(one($discrete)); drift(one($continuous));",
+        "gibbs(one($discrete)); mh(one($continuous)); mh(one($discrete));",
+    ] {
         let text = format!(
             "let y = [-1, -0.5, 2];
              assume stick = mem(fn(k) {{ v ~ beta(1, 1); v }});
@@ -210,8 +220,8 @@ fn elliptical_slice_with_full_covariance() {
         23,
         2,
     );
-    assert_mean("x0", &d["x.1"], expected[0], 0.05);
-    assert_mean("x1", &d["x.2"], expected[1], 0.05);
+    assert_mean("x0", &d["x[0]"], expected[0], 0.05);
+    assert_mean("x1", &d["x[1]"], expected[1], 0.05);
     // a ~ N(0,1), b ~ N(a,1), observe N(b, .5) = 2: b ~ N(0, 2) a priori.
     let d = run(
         "assume a ~ normal(0, 1); assume b ~ normal(a, 1); observe normal(b, 0.5) = 2;

@@ -73,7 +73,10 @@ const PROGRAMS: &[(&str, &str)] = &[
 
 /// The program a fragment stands for, with an order of definition that holds.
 fn program(text: &str) -> String {
-    text.replace("assume g = make(1); assume h = if k { make(2) } else { g };\n         assume k ~ flip(0.5);", "assume k ~ flip(0.5); assume g = make(1); assume h = if k { make(2) } else { g };")
+    text.replace(
+        "assume g = make(1); assume h = if k { make(2) } else { g };\n         assume k ~ flip(0.5);",
+        "assume k ~ flip(0.5); assume g = make(1); assume h = if k { make(2) } else { g };",
+    )
 }
 
 /// After any sequence of proposals, commits and roll-backs, a run from scratch with the same choices has the same score to
@@ -91,7 +94,8 @@ fn increments_equal_a_run_from_scratch() {
                     break;
                 }
                 let n = 1 + (step % 3) as usize;
-                let mut chosen: Vec<_> = (0..n).map(|i| targets[(step as usize * 7 + i * 3 + seed as usize) % targets.len()]).collect();
+                let mut chosen: Vec<_> =
+                    (0..n).map(|i| targets[(step as usize * 7 + i * 3 + seed as usize) % targets.len()]).collect();
                 chosen.sort();
                 chosen.dedup();
                 let before = (t.log_joint().to_bits(), addresses(&t));
@@ -102,7 +106,11 @@ fn increments_equal_a_run_from_scratch() {
                             t.commit();
                         } else {
                             t.rollback();
-                            assert_eq!(before, (t.log_joint().to_bits(), addresses(&t)), "{name}: roll-back restores, step {step}");
+                            assert_eq!(
+                                before,
+                                (t.log_joint().to_bits(), addresses(&t)),
+                                "{name}: roll-back restores, step {step}"
+                            );
                         }
                     }
                     Err(e) => assert!(e.is_recoverable(), "{name}: {e}"),
@@ -110,7 +118,11 @@ fn increments_equal_a_run_from_scratch() {
                 if step % 5 == 0 {
                     let fresh = t.rerun().unwrap_or_else(|e| panic!("{name}: {e}"));
                     assert_eq!(addresses(&fresh), addresses(&t), "{name}: choices, seed {seed} step {step}");
-                    assert_eq!(fresh.log_joint().to_bits(), t.log_joint().to_bits(), "{name}: joint, seed {seed} step {step}");
+                    assert_eq!(
+                        fresh.log_joint().to_bits(),
+                        t.log_joint().to_bits(),
+                        "{name}: joint, seed {seed} step {step}"
+                    );
                     assert_eq!(fresh.log_likelihood().to_bits(), t.log_likelihood().to_bits(), "{name}: likelihood");
                 }
             }
@@ -169,8 +181,16 @@ fn addresses_are_paths() {
         1,
     );
     let expected = [
-        "@a/geom/s", "@a/geom#2/s", "@pose[arm_l]/bone/rot[x]", "@pose[arm_l]/bone/rot[z]", "@pose[leg]/bone/rot[x]",
-        "@pose[leg]/bone/rot[z]", "@x[0]", "@x[1]", "@y[0]", "@y[1]",
+        "@a/geom#2/s",
+        "@a/geom/s",
+        "@pose[arm_l]/bone/rot[x]",
+        "@pose[arm_l]/bone/rot[z]",
+        "@pose[leg]/bone/rot[x]",
+        "@pose[leg]/bone/rot[z]",
+        "@x[0]",
+        "@x[1]",
+        "@y[0]",
+        "@y[1]",
     ];
     let mut got = addresses(&t);
     got.sort();
@@ -225,12 +245,17 @@ fn a_change_reruns_only_what_depends_on_it() {
 #[test]
 fn work_does_not_grow_with_the_trace() {
     let executed = |n: usize| {
-        let text = format!("assume m ~ normal(0, 1); for i in 0 .. {n} {{ z[i] ~ flip(0.3); observe normal(if z[i] {{ m }} else {{ 0 }}, 1) = 1; }}");
+        let text = format!(
+            "assume m ~ normal(0, 1); for i in 0 .. {n} {{ z[i] ~ flip(0.3); observe normal(if z[i] {{ m }} else {{ 0 }}, 1) = 1; }}"
+        );
         let (_, mut t) = trace(&text, 1);
         let all = t.select(&Selector::Kind(pcadlang::trace::ChoiceKind::Discrete));
         let target = t.targets(all)[n / 2];
+        let set = |v| [(target, Change::Set(pcadlang::dist::Datum::Bool(v)))];
+        t.propose(&set(true), at(3)).unwrap();
+        t.commit();
         t.watch();
-        t.regenerate(&[target], at(3)).unwrap();
+        t.propose(&set(false), at(4)).unwrap();
         t.executed().len()
     };
     let few = executed(10);
@@ -245,7 +270,10 @@ fn surrogates_are_not_part_of_the_joint() {
     let (_, plain) = trace("assume x ~ normal(0, 1); observe normal(x, 1) = 2 as y;", 1);
     assert_eq!(t.log_joint().to_bits(), plain.log_joint().to_bits());
     let y = t.observations()[0].0.clone();
-    let x: f64 = match t.choices()[0].1 { pcadlang::lang::value::Value::Num(x) => x, _ => unreachable!() };
+    let x: f64 = match t.choices()[0].1 {
+        pcadlang::lang::value::Value::Num(x) => x,
+        _ => unreachable!(),
+    };
     let expected = normal_pdf(2.0, x, 3.0).ln();
     let got = t.surrogate(&y, at(0)).unwrap().unwrap();
     assert!((got - expected).abs() < 1e-12, "{got} {expected}");

@@ -1,1 +1,25 @@
-//! (to be written)
+//! Shapes: triangle meshes made in code or read from files, placed in the world.
+//!
+//! World: right-handed, y up; lengths in scene units, angles in radians. Knows nothing of cameras or programs.
+
+mod affine;
+mod bounds;
+mod cuboid;
+mod edges;
+mod error;
+pub mod glb;
+mod lathe;
+mod mesh;
+pub mod obj;
+mod revolve;
+mod solid;
+mod sphere;
+
+pub use affine::Affine;
+pub use bounds::Bounds;
+pub use cuboid::cuboid;
+pub use error::GeomError;
+pub use lathe::{Caps, Profile, lathe};
+pub use mesh::{Edge, Mesh, NO_FACE, Topology};
+pub use solid::{Instance, Solid};
+pub use sphere::sphere;

@@ -16,9 +16,8 @@ pub fn run_chains(
     progress: &Progress,
     sinks: Vec<Box<dyn Sink>>,
 ) -> Vec<Result<ChainResult, ChainError>> {
-    let run = |(chain, mut sink): (usize, Box<dyn Sink>)| {
-        run_chain(code, plan, options, progress, &mut *sink, chain as u32)
-    };
+    let run =
+        |(chain, mut sink): (usize, Box<dyn Sink>)| run_chain(code, plan, options, progress, &mut *sink, chain as u32);
     let work: Vec<_> = sinks.into_iter().enumerate().collect();
     match rayon::ThreadPoolBuilder::new().num_threads(threads).build() {
         Ok(pool) => pool.install(|| work.into_par_iter().with_max_len(1).map(run).collect()),

@@ -5,15 +5,20 @@ use super::selection::fail;
 use crate::lang::code::Code;
 use crate::lang::error::RunError;
 use crate::rng::{Purpose, StreamKey};
-use crate::trace::{Address, AddressSegment, Change, Draws, Trace};
 use crate::syntax::ast;
+use crate::trace::{Address, AddressSegment, Change, Draws, Trace};
 use std::sync::Arc;
 
 /// Applies the program's `force` statements in order.
 ///
 /// # Errors
 /// If an address is not that of one choice, or the value does not fit it.
-pub(crate) fn apply(code: &Arc<Code>, trace: &mut Trace, options: &RunOptions, chain: u32) -> Result<(), Box<RunError>> {
+pub(crate) fn apply(
+    code: &Arc<Code>,
+    trace: &mut Trace,
+    options: &RunOptions,
+    chain: u32,
+) -> Result<(), Box<RunError>> {
     let draws = Draws { key: StreamKey::new(options.seed, chain, Purpose::START), step: u64::MAX, lane: 0 };
     for f in &code.forces {
         let value = trace.query(&[f.value], draws)?.swap_remove(0);

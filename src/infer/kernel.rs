@@ -135,7 +135,11 @@ pub(crate) fn accepts(log_ratio: f64, rng: &mut Stream) -> bool {
 /// Keeps or undoes the pending proposal.
 pub(crate) fn decide(trace: &mut Trace, log_ratio: f64, rng: &mut Stream) -> Outcome {
     let accepted = accepts(log_ratio, rng);
-    if accepted { trace.commit() } else { trace.rollback() }
+    if accepted {
+        trace.commit()
+    } else {
+        trace.rollback()
+    }
     Outcome::one(accepted)
 }
 

@@ -224,13 +224,7 @@ fn call(e: &Expr) -> Option<(&str, &[crate::syntax::ast::Arg])> {
 
 impl Runner<'_> {
     fn at(&self) -> At {
-        At {
-            seed: self.options.seed,
-            chain: self.chain,
-            step: self.step,
-            adapting: self.in_warmup,
-            power: self.power,
-        }
+        At { seed: self.options.seed, chain: self.chain, step: self.step, adapting: self.in_warmup, power: self.power }
     }
 
     fn predictive(&self) -> Draws {
@@ -515,7 +509,7 @@ impl Runner<'_> {
 
     /// The text of a kernel for tables.
     fn label(&self, e: &Expr) -> String {
-        crate::syntax::print::expr(e)
+        crate::syntax::print_expr(e)
     }
 
     /// `anneal(from)`: raises the power of the likelihood from 1/from to 1 over a warm-up.
@@ -526,7 +520,9 @@ impl Runner<'_> {
         let from = match args {
             [a] => match self.value(&a.value)? {
                 Value::Num(t) if t >= 1.0 => t,
-                v => return Err(fail(a.value.span, format!("a temperature of at least 1 was expected, got {v}")).into()),
+                v => {
+                    return Err(fail(a.value.span, format!("a temperature of at least 1 was expected, got {v}")).into());
+                }
             },
             _ => return Err(fail(e.span, "anneal takes one temperature to start from".into()).into()),
         };

@@ -1,7 +1,7 @@
 //! Recording draws: which columns there are, and flattening values into them.
 
 use super::draws::{Column, Shape};
-use crate::lang::code::{Code, Operand};
+use crate::lang::code::Code;
 use crate::lang::error::RunError;
 use crate::lang::value::Value;
 use crate::syntax::ast::{Expr, ExprKind, KStmt, KStmtKind};
@@ -52,13 +52,13 @@ impl Recorder {
             }
             None => {
                 names.extend(code.assumed.iter().map(|(n, _)| n.to_string()));
-                operands.extend(code.assumed.iter().map(|(_, s)| Operand::Local(*s)));
+                operands.extend(code.assumed.iter().map(|(_, o)| *o));
             }
         }
-        for (n, s) in &code.predictions {
+        for (n, o) in &code.predictions {
             if !names.iter().any(|m| **m == **n) {
                 names.push(n.to_string());
-                operands.push(Operand::Local(*s));
+                operands.push(*o);
             }
         }
         Ok(names.into_iter().zip(trace.query(&operands, draws)?).collect())
@@ -133,7 +133,7 @@ fn flatten(v: &Value, out: &mut Vec<f64>) {
 fn column_name(e: &Expr) -> String {
     match &e.kind {
         ExprKind::Call { callee, args } if args.is_empty() => column_name(callee),
-        _ => crate::syntax::print::expr(e).replace('.', "/"),
+        _ => crate::syntax::print_expr(e).replace('.', "/"),
     }
 }
 

@@ -38,12 +38,10 @@ impl Address {
     /// Whether this address is `other` or lies below it: same segments, and at the last of them the same leading keys.
     pub fn starts_with(&self, other: &Address) -> bool {
         let Some((last, init)) = other.segments.split_last() else { return true };
-        self.segments.len() >= other.segments.len()
-            && self.segments[..init.len()] == *init
-            && {
-                let s = &self.segments[init.len()];
-                s.name == last.name && s.occurrence == last.occurrence && s.keys.starts_with(&last.keys)
-            }
+        self.segments.len() >= other.segments.len() && self.segments[..init.len()] == *init && {
+            let s = &self.segments[init.len()];
+            s.name == last.name && s.occurrence == last.occurrence && s.keys.starts_with(&last.keys)
+        }
     }
 }
 

@@ -48,11 +48,11 @@ pub struct Code {
     /// Top-level names and their slots, in order of binding.
     pub globals: indexmap::IndexMap<Arc<str>, Operand>,
     /// What `predict` records, in order.
-    pub predictions: Vec<(Arc<str>, Slot)>,
+    pub predictions: Vec<(Arc<str>, Operand)>,
     /// The names bound by `assume`, in order: what a report shows when nothing else is collected.
-    pub assumed: Vec<(Arc<str>, Slot)>,
+    pub assumed: Vec<(Arc<str>, Operand)>,
     /// `sample e;` statements, in order.
-    pub samples: Vec<Slot>,
+    pub samples: Vec<Operand>,
     /// `force @a = v;` statements, in order.
     pub forces: Vec<Force>,
     /// `freeze sel;` statements, in order.

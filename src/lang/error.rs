@@ -1,7 +1,7 @@
 //! Errors while a program runs: what went wrong, where in the text, at which address, through which calls.
 
-use crate::syntax::span::Span;
 use super::address::Address;
+use crate::syntax::span::Span;
 use std::fmt;
 use std::sync::Arc;
 

@@ -23,9 +23,9 @@ pub fn index_value(base: &Value, key: &Value) -> Result<Value, Fault> {
                 None => fault.with_hint(format!("its fields are {}", fields.collect::<Vec<_>>().join(", "))),
             }
         }),
-        (Value::Object(o), Value::Str(name)) => o.field(name).ok_or_else(|| {
-            Fault::new(FaultKind::Index, format!("{} has no field `{name}`", o.type_name()))
-        }),
+        (Value::Object(o), Value::Str(name)) => o
+            .field(name)
+            .ok_or_else(|| Fault::new(FaultKind::Index, format!("{} has no field `{name}`", o.type_name()))),
         (Value::Array(_) | Value::List(_), k) => {
             Err(Fault::type_error(format!("an array is indexed by a number, not by {}", k.type_name())))
         }

@@ -1,8 +1,13 @@
-//! local
+//! The language without its syntax: values, addresses, built-ins, and lowering from syntax trees to code.
+//!
+//! The way of a program: [`load`] finds its files, [`lower`] checks names and types and makes [`code`]; the trace runs it.
+
 pub mod address;
 pub mod builtins;
 pub mod code;
 pub mod error;
 pub mod index;
 pub mod key;
+pub mod load;
+pub mod lower;
 pub mod value;

@@ -195,8 +195,7 @@ impl Value {
             }
             (Value::Record(a), Value::Record(b)) => {
                 Arc::ptr_eq(a, b)
-                    || (a.len() == b.len()
-                        && a.iter().zip(b.iter()).all(|((ka, x), (kb, y))| ka == kb && x.same(y)))
+                    || (a.len() == b.len() && a.iter().zip(b.iter()).all(|((ka, x), (kb, y))| ka == kb && x.same(y)))
             }
             (Value::Closure(a), Value::Closure(b)) => a == b,
             (Value::Builtin(a), Value::Builtin(b)) => a == b,

@@ -6,18 +6,9 @@
 pub mod csv;
 mod draws;
 mod hash;
-pub mod html;
 pub mod npy;
-mod number;
-pub mod pictures;
-mod rundir;
 mod sinks;
-pub mod table;
-mod warnings;
 
 pub use draws::{ChainDraws, Quantity, quantities};
 pub use hash::text_hash;
-pub use number::{clock, count, number};
-pub use rundir::{ChainInfo, ProgramInfo, RunDir, RunDirError, RunInfo, RunState, SummaryEntry};
 pub use sinks::{Memory, Tee};
-pub use warnings::warnings;

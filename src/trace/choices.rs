@@ -1,7 +1,8 @@
 //! The register of active choices: by address, and by the selections kernels have asked for.
 //!
-//! Each selection keeps its members in a list, so that one of them is picked in constant time. The order is that of
-//! appearance, with the last member moving into the place of one that leaves: it is part of the trace's state.
+//! Each selection keeps its members in a list, so that one of them is picked in constant time. The order is that of the
+//! hashes of their addresses: a function of the state, not of how it came about. Who appears or leaves in an update is
+//! noted, and entered at its end.
 
 use super::demand::Failure;
 use super::graph::Graph;
@@ -28,11 +29,65 @@ pub struct Target {
 #[derive(Clone, Copy, Debug, PartialEq, Eq, Hash)]
 pub struct Selection(pub(crate) u32);
 
+/// A list of targets and the address hash of each, both in order.
+pub(crate) type Listed = (Arc<Vec<u64>>, Arc<Vec<Target>>);
+
 #[derive(Clone, Debug)]
 pub(crate) struct Members {
     selector: Selector,
-    pub targets: Vec<Target>,
-    place: FxHashMap<NodeId, u32>,
+    listed: Listed,
+    /// What this update adds and takes away.
+    added: Vec<(u64, Target)>,
+    removed: Vec<(u64, NodeId)>,
+}
+
+impl Members {
+    fn new(selector: Selector, hashes: Vec<u64>, targets: Vec<Target>) -> Self {
+        Members { selector, listed: (Arc::new(hashes), Arc::new(targets)), added: Vec::new(), removed: Vec::new() }
+    }
+
+    /// The members in order.
+    pub fn targets(&self) -> &[Target] {
+        &self.listed.1
+    }
+
+    /// Enters what this update changed, and gives the list as it was.
+    fn apply(&mut self) -> Option<Listed> {
+        if self.added.is_empty() && self.removed.is_empty() {
+            return None;
+        }
+        let before = self.listed.clone();
+        let (hashes, targets) = (Arc::make_mut(&mut self.listed.0), Arc::make_mut(&mut self.listed.1));
+        for (hash, node) in self.removed.drain(..) {
+            let first = hashes.partition_point(|h| *h < hash);
+            let same = hashes[first..].iter().take_while(|h| **h == hash).count();
+            let leaves = |i: &usize| targets[*i].node == node;
+            if let Some(from) = (first..first + same).find(leaves) {
+                let to = (from..first + same).take_while(leaves).last().map_or(from, |i| i + 1);
+                hashes.drain(from..to);
+                targets.drain(from..to);
+            }
+        }
+        self.added.sort_by_key(|(hash, t)| (*hash, t.element));
+        if self.added.len() > 8 {
+            let mut all: Vec<(u64, Target)> =
+                hashes.drain(..).zip(targets.drain(..)).chain(self.added.drain(..)).collect();
+            // Stable, and nearly sorted already.
+            all.sort_by_key(|(hash, t)| (*hash, t.element));
+            hashes.extend(all.iter().map(|(h, _)| *h));
+            targets.extend(all.iter().map(|(_, t)| *t));
+        } else {
+            for (hash, target) in self.added.drain(..) {
+                let mut at = hashes.partition_point(|h| *h < hash);
+                while at < hashes.len() && hashes[at] == hash && targets[at].element < target.element {
+                    at += 1;
+                }
+                hashes.insert(at, hash);
+                targets.insert(at, target);
+            }
+        }
+        Some(before)
+    }
 }
 
 #[derive(Clone, Debug)]
@@ -45,7 +100,7 @@ pub(crate) struct Choices {
 
 impl Default for Choices {
     fn default() -> Self {
-        let all = Members { selector: Selector::All, targets: Vec::new(), place: FxHashMap::default() };
+        let all = Members::new(Selector::All, Vec::new(), Vec::new());
         Choices { by_address: FxHashMap::default(), selections: vec![all], suspects: Vec::new() }
     }
 }
@@ -58,6 +113,10 @@ impl Choices {
 
     pub fn forget_update(&mut self) {
         self.suspects.clear();
+        for m in &mut self.selections {
+            m.added.clear();
+            m.removed.clear();
+        }
     }
 
     pub fn undo_add(&mut self, n: NodeId, hash: u64) {
@@ -74,41 +133,8 @@ impl Choices {
         self.by_address.insert(hash, n);
     }
 
-    pub fn undo_target(&mut self, selection: u32, at: u32, target: Target) {
-        let m = &mut self.selections[selection as usize];
-        let last = m.targets.len();
-        if at as usize == last {
-            m.targets.push(target);
-        } else {
-            let moved = std::mem::replace(&mut m.targets[at as usize], target);
-            m.targets.push(moved);
-            if moved.element == NONE {
-                m.place.insert(moved.node, last as u32);
-            }
-        }
-        m.place.insert(target.node, at);
-    }
-
-    pub fn undo_targets(&mut self, selection: u32, before: Vec<Target>) {
-        let m = &mut self.selections[selection as usize];
-        m.targets = before;
-        m.index();
-    }
-
-    pub fn undo_added(&mut self, selection: u32, count: u32) {
-        let m = &mut self.selections[selection as usize];
-        for _ in 0..count {
-            if let Some(t) = m.targets.pop() {
-                m.place.remove(&t.node);
-            }
-        }
-    }
-}
-
-impl Members {
-    fn index(&mut self) {
-        let whole = self.targets.iter().enumerate().filter(|(_, t)| t.element == NONE);
-        self.place = whole.map(|(i, t)| (t.node, i as u32)).collect();
+    pub fn undo_targets(&mut self, selection: u32, before: Listed) {
+        self.selections[selection as usize].listed = before;
     }
 }
 
@@ -118,17 +144,19 @@ impl Graph {
         if let Some(i) = self.choices.selections.iter().position(|m| m.selector == *selector) {
             return Selection(i as u32);
         }
-        let mut members = Members { selector: selector.clone(), targets: Vec::new(), place: FxHashMap::default() };
-        for t in &self.choices.selections[0].targets {
+        let all = self.choices.selections[0].listed.clone();
+        let (mut hashes, mut targets) = (Vec::new(), Vec::new());
+        for (hash, t) in all.0.iter().zip(all.1.iter()) {
             let mut facts = self.facts(code, t.node, selector.needs_address(), None);
             if t.element != NONE && selector.needs_address() {
                 push_key(&mut facts.address, t.element);
             }
             if selector.selects(&facts) {
-                members.targets.push(*t);
+                hashes.push(*hash);
+                targets.push(*t);
             }
         }
-        members.index();
+        let members = Members::new(selector.clone(), hashes, targets);
         self.choices.selections.push(members);
         Selection(self.choices.selections.len() as u32 - 1)
     }
@@ -203,7 +231,6 @@ impl Graph {
         let needs_address = self.choices.selections.iter().any(|m| m.selector.needs_address());
         let mut facts = needs_facts.then(|| self.facts(code, n, needs_address, Some(dist)));
         for i in 0..self.choices.selections.len() {
-            let mut count = 0;
             for e in 0..elements.unwrap_or(1) {
                 let element = if elements.is_some() { e as u32 } else { NONE };
                 let selected = match &mut facts {
@@ -217,16 +244,8 @@ impl Graph {
                     Some(f) => self.choices.selections[i].selector.selects(f),
                 };
                 if selected {
-                    let m = &mut self.choices.selections[i];
-                    if element == NONE {
-                        m.place.insert(n, m.targets.len() as u32);
-                    }
-                    m.targets.push(Target { node: n, element });
-                    count += 1;
+                    self.choices.selections[i].added.push((hash, Target { node: n, element }));
                 }
-            }
-            if count > 0 {
-                self.journal.push(Entry::TargetsAdded { selection: i as u32, count });
             }
         }
         Ok(())
@@ -238,27 +257,27 @@ impl Graph {
             self.choices.by_address.remove(&hash);
             self.journal.push(Entry::ChoiceRemoved(n, hash));
         }
-        for i in 0..self.choices.selections.len() {
-            let m = &mut self.choices.selections[i];
-            if let Some(at) = m.place.remove(&n) {
-                let target = m.targets.swap_remove(at as usize);
-                if let Some(moved) = m.targets.get(at as usize)
-                    && moved.element == NONE
-                {
-                    m.place.insert(moved.node, at);
-                }
-                self.journal.push(Entry::TargetRemoved { selection: i as u32, at, target });
-            } else if m.targets.iter().any(|t| t.node == n) {
-                let before = m.targets.clone();
-                m.targets.retain(|t| t.node != n);
-                m.index();
-                self.journal.push(Entry::TargetsReplaced { selection: i as u32, before });
+        for m in &mut self.choices.selections {
+            let before = m.added.len();
+            m.added.retain(|(_, t)| t.node != n);
+            if m.added.len() == before {
+                m.removed.push((hash, n));
             }
         }
     }
 
+    /// Ends an update: selections get their new members, and two choices at one address are an error at the second.
+    pub fn settle_choices(&mut self, code: &Code) -> Result<(), Failure> {
+        for i in 0..self.choices.selections.len() {
+            if let Some(before) = self.choices.selections[i].apply() {
+                self.journal.push(Entry::TargetsReplaced { selection: i as u32, before });
+            }
+        }
+        self.check_duplicates(code)
+    }
+
     /// Two choices at one address are an error at the second.
-    pub fn check_duplicates(&mut self, code: &Code) -> Result<(), Failure> {
+    fn check_duplicates(&mut self, code: &Code) -> Result<(), Failure> {
         for (old, new) in std::mem::take(&mut self.choices.suspects) {
             let alive = |n: NodeId| self.nodes[n as usize].state != State::Empty;
             if alive(old) && alive(new) {

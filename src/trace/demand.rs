@@ -34,7 +34,7 @@ impl Graph {
                 self.run_in_place(code, n)?;
             }
         }
-        self.check_duplicates(code)
+        self.settle_choices(code)
     }
 
     fn run_effects(&mut self, code: &Code) -> Result<(), Failure> {

@@ -14,7 +14,15 @@ use crate::num::ExactSum;
 #[derive(Clone, Debug)]
 pub(crate) enum Entry {
     /// The plain fields of a node before the update.
-    Node { id: NodeId, value: Value, score: f64, refs: u32, changed: u32, state: State, flags: u8 },
+    Node {
+        id: NodeId,
+        value: Value,
+        score: f64,
+        refs: u32,
+        changed: u32,
+        state: State,
+        flags: u8,
+    },
     /// A node's side before it was replaced.
     Side(NodeId, Option<Box<Side>>),
     /// The content of a choice's side before it changed.
@@ -37,10 +45,11 @@ pub(crate) enum Entry {
     /// A choice was registered, or removed from the given places.
     ChoiceAdded(NodeId, u64),
     ChoiceRemoved(NodeId, u64),
-    /// A target was removed from a selection at a position, or a run of them.
-    TargetRemoved { selection: u32, at: u32, target: super::choices::Target },
-    TargetsReplaced { selection: u32, before: Vec<super::choices::Target> },
-    TargetsAdded { selection: u32, count: u32 },
+    /// The members of a selection changed.
+    TargetsReplaced {
+        selection: u32,
+        before: super::choices::Listed,
+    },
     /// An address index entry was overwritten.
     AddressShadowed(u64, NodeId),
 }
@@ -156,9 +165,7 @@ impl Graph {
                 }
                 Entry::ChoiceAdded(n, hash) => self.choices.undo_add(n, hash),
                 Entry::ChoiceRemoved(n, hash) => self.choices.undo_remove(n, hash),
-                Entry::TargetRemoved { selection, at, target } => self.choices.undo_target(selection, at, target),
                 Entry::TargetsReplaced { selection, before } => self.choices.undo_targets(selection, before),
-                Entry::TargetsAdded { selection, count } => self.choices.undo_added(selection, count),
                 Entry::AddressShadowed(hash, n) => self.choices.undo_shadow(hash, n),
             }
         }

@@ -35,7 +35,8 @@ impl Graph {
     /// Marks the users of a node; those that may pass a change on go to the stack.
     fn mark_users(&mut self, code: &Code, n: NodeId) {
         let (frame, list) = (self.nodes[n as usize].frame as usize, self.nodes[n as usize].outside as usize);
-        let (block, base, owner) = (self.frames[frame].block as usize, self.frames[frame].base, self.frames[frame].owner);
+        let (block, base, owner) =
+            (self.frames[frame].block as usize, self.frames[frame].base, self.frames[frame].owner);
         let slot = n - base;
         let block = &code.blocks[block];
         for user in &block.users[slot as usize] {

@@ -199,7 +199,7 @@ impl Trace {
 
     /// The choices a selection now has.
     pub fn targets(&self, selection: Selection) -> &[Target] {
-        &self.graph.choices.selections[selection.0 as usize].targets
+        self.graph.choices.selections[selection.0 as usize].targets()
     }
 
     /// The choice at an address, if it is active. An element of a choice has the element's index as last key.
@@ -260,7 +260,7 @@ impl Trace {
 
     /// How many choices (elements counted one by one) are active.
     pub fn choice_count(&self) -> usize {
-        self.graph.choices.selections[0].targets.len()
+        self.graph.choices.selections[0].targets().len()
     }
 
     /// The values of expressions of the top level; what they need and no observation asks for is drawn from its prior
@@ -327,8 +327,9 @@ impl Trace {
 
     /// Every active choice with its address and log density, by address.
     pub fn choices(&self) -> Vec<(Address, Value, f64)> {
-        let targets = &self.graph.choices.selections[0].targets;
-        let mut all: Vec<_> = targets.iter().map(|t| (self.address(*t), self.value(*t), self.target_score(*t))).collect();
+        let targets = self.graph.choices.selections[0].targets();
+        let mut all: Vec<_> =
+            targets.iter().map(|t| (self.address(*t), self.value(*t), self.target_score(*t))).collect();
         all.sort_by(|a, b| a.0.cmp(&b.0));
         all
     }
@@ -360,7 +361,7 @@ impl Trace {
 
     /// The choices as constraints for [`Trace::generate`].
     pub fn constraints(&self) -> Vec<(u64, Constraint)> {
-        let targets = &self.graph.choices.selections[0].targets;
+        let targets = self.graph.choices.selections[0].targets();
         let stored = targets.iter().filter_map(|t| self.stored(*t).map(|d| (self.address_hash(*t), d)));
         stored.map(|(h, d)| (h, Constraint::Stored(d))).collect()
     }

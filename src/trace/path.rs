@@ -65,17 +65,24 @@ impl Graph {
         h
     }
 
-    /// The segments through a site; the mirror image of [`Graph::hash_site`].
-    fn spell_site(
+    /// The address through a site; the mirror image of [`Graph::hash_site`].
+    fn spell_site(&self, code: &Code, frame: FrameId, site: u32, own: &[Key]) -> Vec<AddressSegment> {
+        let mut segments = self.prefix(code, frame);
+        self.append_site(code, frame, site, None, own, &mut segments);
+        segments
+    }
+
+    /// The segments that a site adds.
+    fn append_site(
         &self,
         code: &Code,
         frame: FrameId,
         site: u32,
         element: Option<&Key>,
         own: &[Key],
-    ) -> Vec<AddressSegment> {
+        segments: &mut Vec<AddressSegment>,
+    ) {
         let site = &code.sites[site as usize];
-        let mut segments = self.prefix(code, frame);
         let last = site.segments.len().saturating_sub(1);
         for (i, s) in site.segments.iter().enumerate() {
             let mut keys = Vec::new();
@@ -90,28 +97,34 @@ impl Graph {
             }
             segments.push(AddressSegment { name: Arc::clone(&s.name), occurrence: s.occurrence, keys });
         }
-        segments
     }
 
-    /// The address prefix of a frame: the calls that lead to its function.
+    /// The address prefix of a frame: the calls that lead to its function. Not by recursion: calls may be nested deeply.
     fn prefix(&self, code: &Code, frame: FrameId) -> Vec<AddressSegment> {
+        let mut calls = Vec::new();
         let mut f = frame;
         loop {
             let here = &self.frames[f as usize];
             match code.blocks[here.block as usize].kind {
-                BlockKind::Root => return Vec::new(),
+                BlockKind::Root => break,
                 BlockKind::Function { .. } => {
-                    let home = self.nodes[here.owner as usize].frame;
                     let (Op::Call { site, .. } | Op::Map { site, .. } | Op::Fold { site, .. } | Op::Mem { site, .. }) =
                         self.op(code, here.owner)
                     else {
-                        return Vec::new();
+                        break;
                     };
-                    return self.spell_site(code, home, *site, here.key.as_ref(), &[]);
+                    let home = self.nodes[here.owner as usize].frame;
+                    calls.push((home, *site, here.key.as_ref()));
+                    f = home;
                 }
                 _ => f = self.nodes[here.owner as usize].frame,
             }
         }
+        let mut segments = Vec::new();
+        for (home, site, key) in calls.into_iter().rev() {
+            self.append_site(code, home, site, key, &[], &mut segments);
+        }
+        segments
     }
 
     /// The own keys of a choice.
@@ -125,9 +138,9 @@ impl Graph {
         let segments = match self.op(code, n) {
             Op::Draw { site, keys, .. } => {
                 let own = self.own_keys(code, frame, keys);
-                self.spell_site(code, frame, *site, None, &own)
+                self.spell_site(code, frame, *site, &own)
             }
-            Op::Observe { site, .. } | Op::Factor { site, .. } => self.spell_site(code, frame, *site, None, &[]),
+            Op::Observe { site, .. } | Op::Factor { site, .. } => self.spell_site(code, frame, *site, &[]),
             _ => self.prefix(code, frame),
         };
         Address { segments }

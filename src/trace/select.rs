@@ -101,7 +101,8 @@ fn matches(pattern: &[PatternSegment], address: &[AddressSegment]) -> bool {
         }
         Some((PatternSegment::Segment { name, occurrence, keys }, rest)) => {
             let Some((first, below)) = address.split_first() else { return false };
-            let named = name.as_ref().is_none_or(|n| *n == first.name && occurrence.max(&1) == &first.occurrence.max(1));
+            let named =
+                name.as_ref().is_none_or(|n| *n == first.name && occurrence.max(&1) == &first.occurrence.max(1));
             let keyed = keys.len() <= first.keys.len()
                 && (rest.is_empty() || keys.len() == first.keys.len())
                 && keys.iter().zip(&first.keys).all(|(p, k)| p.as_ref().is_none_or(|p| p == k));

@@ -56,7 +56,9 @@ impl Spread {
 
     fn sd(&self) -> f64 {
         let n = self.mean.len() as f64;
-        if self.count < 20.0 || n == 0.0 { return 1.0 }
+        if self.count < 20.0 || n == 0.0 {
+            return 1.0;
+        }
         (self.square / (n * (self.count - 1.0))).sqrt().clamp(1e-3, 1e3)
     }
 }

@@ -52,8 +52,7 @@ impl Kernel for Elliptical {
         for t in &targets {
             here.push(noise(trace, *t).ok_or_else(|| not_gaussian(trace, *t))?);
         }
-        let there: Vec<Vec<f64>> =
-            here.iter().map(|z| z.iter().map(|_| rng.standard_normal()).collect()).collect();
+        let there: Vec<Vec<f64>> = here.iter().map(|z| z.iter().map(|_| rng.standard_normal()).collect()).collect();
         let threshold = libm::log(rng.open_uniform());
         let mut angle = rng.uniform() * TAU;
         let (mut low, mut high) = (angle - TAU, angle);

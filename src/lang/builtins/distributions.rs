@@ -58,9 +58,11 @@ pub(super) const TABLE: &[Builtin] = &[
     scalar!("uniform_discrete", [lo, hi], dist::UniformDiscrete::new(lo, hi).map(Dist::UniformDiscrete)),
     scalar!("binomial", [n, p], dist::Binomial::new(n, p).map(Dist::Binomial)),
     scalar!("poisson", [rate], dist::Poisson::new(rate).map(Dist::Poisson)),
-    other("categorical", &[arg("weights", Type::Array, "One weight for each of 0, 1, …; they need not sum to 1.")], |a| {
-        dist::Categorical::new(&a.array(0)?).map(|d| Dist::Categorical(Arc::new(d))).map_err(fault)
-    }),
+    other(
+        "categorical",
+        &[arg("weights", Type::Array, "One weight for each of 0, 1, …; they need not sum to 1.")],
+        |a| dist::Categorical::new(&a.array(0)?).map(|d| Dist::Categorical(Arc::new(d))).map_err(fault),
+    ),
     other("dirichlet", &[arg("alpha", Type::Array, "One positive concentration for each share.")], |a| {
         dist::Dirichlet::new(&a.array(0)?).map(|d| Dist::Dirichlet(Arc::new(d))).map_err(fault)
     }),
@@ -83,14 +85,10 @@ pub(super) const TABLE: &[Builtin] = &[
         ],
         gp,
     ),
-    other(
-        "iid",
-        &[arg("d", Type::Dist, "A distribution."), arg("n", Type::Int, "How many.")],
-        |a| {
-            let Value::Dist(d) = a.get(0) else { return Err(a.wrong(0, "a distribution")) };
-            dist::Iid::new(Dist::clone(d), a.count(1)?).map(|d| Dist::Iid(Arc::new(d))).map_err(fault)
-        },
-    ),
+    other("iid", &[arg("d", Type::Dist, "A distribution."), arg("n", Type::Int, "How many.")], |a| {
+        let Value::Dist(d) = a.get(0) else { return Err(a.wrong(0, "a distribution")) };
+        dist::Iid::new(Dist::clone(d), a.count(1)?).map(|d| Dist::Iid(Arc::new(d))).map_err(fault)
+    }),
 ];
 
 /// What the reference says of a family besides its arguments.
@@ -161,7 +159,9 @@ fn square(a: &Args, i: usize, n: usize) -> Result<nalgebra::DMatrix<f64>, Fault>
     let m = Matrix::read(a, i)?;
     if m.rows.len() != n || m.width != n {
         let (name, rows, columns) = (a.builtin.args[i].name, m.rows.len(), m.width);
-        return Err(Fault::type_error(format!("mv_normal: `{name}` must be {n} x {n} like the mean, got {rows} x {columns}")));
+        return Err(Fault::type_error(format!(
+            "mv_normal: `{name}` must be {n} x {n} like the mean, got {rows} x {columns}"
+        )));
     }
     Ok(nalgebra::DMatrix::from_fn(n, n, |i, j| m.rows[i][j]))
 }

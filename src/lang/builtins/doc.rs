@@ -97,7 +97,7 @@ fn notes(b: &Builtin) -> Vec<(&'static str, String)> {
         notes.push(("Not available yet", "checked, but a run that reaches it ends with an error.".to_owned()));
     }
     if matches!(b.kind, Kind::Distribution(_)) {
-
+        notes.extend(super::distributions::notes(b.name));
     }
     notes
 }

@@ -11,8 +11,22 @@ const MONITORS: &str = "Monitors and reports";
 
 /// What this version checks and documents but cannot run.
 pub(super) const PLANNED: &[&str] = &[
-    "slice", "hmc", "nuts", "mala", "knn", "delayed", "temper", "smc", "abc", "optimize", "marginal", "acceptance", "rhat",
-    "ess", "snapshot", "keypoints",
+    "slice",
+    "hmc",
+    "nuts",
+    "mala",
+    "knn",
+    "delayed",
+    "temper",
+    "smc",
+    "abc",
+    "optimize",
+    "marginal",
+    "acceptance",
+    "rhat",
+    "ess",
+    "snapshot",
+    "keypoints",
 ];
 
 const fn name(
@@ -47,7 +61,15 @@ pub(super) const TABLE: &[Builtin] = &[
     name(
         "drift",
         KERNELS,
-        &[SEL, opt("scale", Type::Num, "learnt", "A fixed step size in the unconstrained space, instead of one learnt in warm-up.")],
+        &[
+            SEL,
+            opt(
+                "scale",
+                Type::Num,
+                "learnt",
+                "A fixed step size in the unconstrained space, instead of one learnt in warm-up.",
+            ),
+        ],
         Type::Kernel,
         "Gaussian random walk in the unconstrained space of the support; discrete choices step to another value.",
     ),

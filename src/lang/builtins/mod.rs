@@ -4,7 +4,9 @@
 //! the same arguments give the same value to the last bit, on every platform.
 
 mod args;
+mod covariance;
 pub mod data;
+mod distributions;
 pub mod doc;
 mod elementwise;
 mod forms;

@@ -3,6 +3,7 @@
 //! Numbers follow IEEE 754: division by zero gives an infinity or NaN, which is caught where it is scored.
 
 use super::args::MAX_ELEMENTS;
+use super::covariance::CovarianceValue;
 use super::elementwise::{array, array_len, broadcast, numeric, unary};
 use super::{Arg, Args, Builtin, Type, arg, function};
 use crate::lang::error::Fault;
@@ -74,7 +75,7 @@ pub(super) const TABLE: &[Builtin] = &[
 fn add(a: &Args) -> Result<Value, Fault> {
     numeric(a, a.get(0), a.get(1), |x, y| x + y, &|x, y| match (x, y) {
         (Value::Str(x), Value::Str(y)) => Ok(Value::Str(format!("{x}{y}").into())),
-        _ => Err(unsuited(a, "numbers or strings", x, y)),
+        _ => CovarianceValue::sum(x, y).ok_or_else(|| unsuited(a, "numbers or strings", x, y)),
     })
 }
 

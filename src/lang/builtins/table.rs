@@ -2,7 +2,7 @@
 //!
 //! Not a scope: shadowing by a program's own names is the business of lowering.
 
-use super::{Builtin, data, forms, inference, list, math, matrix, operators, reduce};
+use super::{Builtin, covariance, data, distributions, forms, inference, list, math, matrix, operators, reduce};
 use indexmap::IndexMap;
 use rustc_hash::FxBuildHasher;
 
@@ -24,8 +24,18 @@ const CONSTANTS: &[Constant] = &[
 
 /// Those of the language, in the order of the reference.
 pub(super) fn all() -> impl Iterator<Item = Builtin> {
-    let own =
-        [operators::TABLE, math::TABLE, reduce::TABLE, list::TABLE, matrix::TABLE, forms::TABLE, data::TABLE, inference::TABLE];
+    let own = [
+        operators::TABLE,
+        math::TABLE,
+        reduce::TABLE,
+        list::TABLE,
+        matrix::TABLE,
+        distributions::TABLE,
+        covariance::TABLE,
+        forms::TABLE,
+        data::TABLE,
+        inference::TABLE,
+    ];
     own.into_iter().flatten().copied()
 }
 

@@ -75,7 +75,8 @@ impl<W: Write + Send> Sink for CsvSink<W> {
     }
 
     fn chain_done(&mut self, _chain: u32, steps: u64, warmup: u64, seconds: f64) -> io::Result<()> {
-        let text = format!("# steps = {steps}\n# warmup_steps = {warmup}\n# Elapsed Time: {seconds:.3} seconds (Total)\n");
+        let text =
+            format!("# steps = {steps}\n# warmup_steps = {warmup}\n# Elapsed Time: {seconds:.3} seconds (Total)\n");
         self.out.write_all(text.as_bytes())?;
         self.out.flush()
     }

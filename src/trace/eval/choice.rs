@@ -88,14 +88,7 @@ impl Graph {
         made.map_err(|f| self.fault(code, n, f))
     }
 
-    fn own_keyed(
-        &self,
-        code: &Code,
-        n: NodeId,
-        frame: FrameId,
-        site: u32,
-        keys: &[Operand],
-    ) -> Result<u64, Failure> {
+    fn own_keyed(&self, code: &Code, n: NodeId, frame: FrameId, site: u32, keys: &[Operand]) -> Result<u64, Failure> {
         let own = self.own_keys(code, frame, keys);
         if own.len() < keys.len() {
             return Err(self.type_error(code, n, "a key must be a number, a string or a bool".into()));
@@ -268,8 +261,7 @@ impl Graph {
         let side = side.clone();
         let count = side.elements as usize;
         let old = self.nodes[n as usize].value.clone();
-        let mut xs: Vec<Datum> =
-            (0..count).filter_map(|i| old.element(i).as_ref().and_then(Value::to_datum)).collect();
+        let mut xs: Vec<Datum> = (0..count).filter_map(|i| old.element(i).as_ref().and_then(Value::to_datum)).collect();
         let changes: SmallVec<[(u32, Change); 4]> = if self.nodes[n as usize].flags & TARGET != 0 {
             self.pending_of(n).map(|p| (p.element, p.change.clone())).collect()
         } else {

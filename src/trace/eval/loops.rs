@@ -103,9 +103,8 @@ impl Graph {
             Value::Closure(c) => (c.block, c.frame),
             Value::Builtin(i) => {
                 let builtin = code.builtins.get(*i);
-                let results: Result<Vec<Value>, Fault> = (0..keys.len())
-                    .map(|i| super::apply(builtin, &[&items.element(i).unwrap_or_default()]))
-                    .collect();
+                let results: Result<Vec<Value>, Fault> =
+                    (0..keys.len()).map(|i| super::apply(builtin, &[&items.element(i).unwrap_or_default()])).collect();
                 let results = results.map_err(|e| self.fault(code, n, e))?;
                 let value = match keys {
                     Keys::Listed { ref keys, .. } if matches!(xs, Value::Record(_)) => {
@@ -318,12 +317,8 @@ impl Graph {
         let home = self.nodes[owner as usize].frame;
         let here = &self.frames[home as usize];
         let (path, depth, args) = match self.op(code, owner) {
-            Op::Map { site, .. } => {
-                (self.keyed_site_hash(code, home, *site, &key), here.depth + 1, Arguments::Item)
-            }
-            Op::Fold { site, .. } => {
-                (self.keyed_site_hash(code, home, *site, &key), here.depth + 1, Arguments::Fold)
-            }
+            Op::Map { site, .. } => (self.keyed_site_hash(code, home, *site, &key), here.depth + 1, Arguments::Item),
+            Op::Fold { site, .. } => (self.keyed_site_hash(code, home, *site, &key), here.depth + 1, Arguments::Fold),
             _ => (here.path, here.depth, Arguments::None),
         };
         debug_assert!(!matches!(code.blocks[block as usize].kind, BlockKind::Root));

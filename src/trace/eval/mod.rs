@@ -55,8 +55,7 @@ impl Graph {
                 }
                 let mut deps = Deps::new();
                 let fields = names.iter().zip(values.iter());
-                let fields =
-                    fields.map(|(k, o)| (k.clone(), self.plain(code, frame, *o, &mut deps).clone())).collect();
+                let fields = fields.map(|(k, o)| (k.clone(), self.plain(code, frame, *o, &mut deps).clone())).collect();
                 self.set_deps(n, deps);
                 Ok(self.finish(code, n, Value::Record(std::sync::Arc::new(fields))))
             }

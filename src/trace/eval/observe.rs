@@ -81,9 +81,7 @@ impl Graph {
                 Value::Dist(_) => {}
                 v @ Value::Likelihood(_) => {
                     let observed = self.plain(code, frame, value, deps);
-                    return likelihood_score(v, observed)
-                        .map(Score::One)
-                        .map_err(|f| self.fault(code, n, f));
+                    return likelihood_score(v, observed).map(Score::One).map_err(|f| self.fault(code, n, f));
                 }
                 v => {
                     let message = format!("`observe` needs a distribution or likelihood, got {}", v.type_name());
@@ -169,9 +167,7 @@ fn likelihood_score(v: &Value, observed: &Value) -> Result<f64, Fault> {
 
 /// Scores a value, element by element where the distribution is over single numbers and the value is an array.
 fn score_value(dist: &Dist, observed: &Value) -> Result<Score, Fault> {
-    let wrong = || {
-        Fault::type_error(format!("`{}` cannot be observed to be {}", dist.name(), observed.type_name()))
-    };
+    let wrong = || Fault::type_error(format!("`{}` cannot be observed to be {}", dist.name(), observed.type_name()));
     if let Some(count) = dist.elements() {
         if observed.len() != Some(count) {
             let got = observed.len().map_or(observed.type_name().to_owned(), |l| format!("{l} values"));
@@ -186,9 +182,7 @@ fn score_value(dist: &Dist, observed: &Value) -> Result<Score, Fault> {
         Value::Num(x) => Ok(Score::One(dist.log_density(&Datum::Num(*x)))),
         Value::Bool(b) => Ok(Score::One(dist.log_density(&Datum::Bool(*b)))),
         Value::Array(xs) if dist.is_scalar() => sum_scores(xs.len(), |i| Ok(dist.log_density(&Datum::Num(xs[i])))),
-        Value::List(xs) => sum_scores(xs.len(), |i| {
-            xs[i].to_datum().map(|x| dist.log_density(&x)).ok_or_else(wrong)
-        }),
+        Value::List(xs) => sum_scores(xs.len(), |i| xs[i].to_datum().map(|x| dist.log_density(&x)).ok_or_else(wrong)),
         Value::Array(xs) => Ok(Score::One(dist.log_density(&Datum::Vec(std::sync::Arc::clone(xs))))),
         _ => Err(wrong()),
     }

@@ -134,7 +134,10 @@ mod tests {
 
     #[test]
     fn quotes_protect_separators_and_line_ends() {
-        assert_eq!(read("a,b\n\"1,5\",\"say \"\"hi\"\"\nthere\"\n"), "{ a: [\"1,5\"], b: [\"say \\\"hi\\\"\\nthere\"] }");
+        assert_eq!(
+            read("a,b\n\"1,5\",\"say \"\"hi\"\"\nthere\"\n"),
+            "{ a: [\"1,5\"], b: [\"say \\\"hi\\\"\\nthere\"] }"
+        );
         assert_eq!(read("a,b\n\"1\n2\",x\n3\n"), "line 4: 1 fields where the header has 2");
     }
 

@@ -1,0 +1,99 @@
+//! Placements: affine maps of the world.
+
+use glam::{DAffine3, DMat3, DVec3};
+use std::ops::Mul;
+
+/// An affine map p' = T Rz Ry Rx S p (Kulkarni et al. 2014, section 2.1.1, in that order).
+#[derive(Clone, Copy, Debug, PartialEq)]
+pub struct Affine(pub DAffine3);
+
+impl Affine {
+    /// The map that changes nothing.
+    pub const IDENTITY: Affine = Affine(DAffine3::IDENTITY);
+
+    /// Scales along the axes, then turns round x, y and z (radians), then shifts.
+    pub fn new(translate: DVec3, rotate: DVec3, scale: DVec3) -> Affine {
+        let axis = |angle: f64| (libm::sin(angle), libm::cos(angle));
+        let ((sx, cx), (sy, cy), (sz, cz)) = (axis(rotate.x), axis(rotate.y), axis(rotate.z));
+        // Rz Ry Rx written out, by columns.
+        let x = DVec3::new(cz * cy, sz * cy, -sy);
+        let y = DVec3::new(cz * sy * sx - sz * cx, sz * sy * sx + cz * cx, cy * sx);
+        let z = DVec3::new(cz * sy * cx + sz * sx, sz * sy * cx - cz * sx, cy * cx);
+        Affine(DAffine3 { matrix3: DMat3::from_cols(x * scale.x, y * scale.y, z * scale.z), translation: translate })
+    }
+
+    /// The image of a point.
+    pub fn point(&self, p: DVec3) -> DVec3 {
+        self.0.matrix3 * p + self.0.translation
+    }
+
+    /// What takes normals along: the cofactor matrix, which is the determinant times the inverse transpose. Outward normals
+    /// stay outward also when the map mirrors, and it exists when the map is singular. Its results are not unit vectors.
+    pub fn normal_matrix(&self) -> DMat3 {
+        let m = self.0.matrix3;
+        let cofactor = DMat3::from_cols(m.y_axis.cross(m.z_axis), m.z_axis.cross(m.x_axis), m.x_axis.cross(m.y_axis));
+        if self.is_mirrored() { -1.0 * cofactor } else { cofactor }
+    }
+
+    /// Whether it turns left hands into right ones.
+    pub fn is_mirrored(&self) -> bool {
+        self.0.matrix3.determinant() < 0.0
+    }
+
+    /// The map that undoes it, if there is one.
+    pub fn inverse(&self) -> Option<Affine> {
+        let d = self.0.matrix3.determinant();
+        (d != 0.0 && d.is_finite()).then(|| Affine(self.0.inverse())).filter(Affine::is_finite)
+    }
+
+    /// Whether all its numbers are finite.
+    pub fn is_finite(&self) -> bool {
+        self.0.is_finite()
+    }
+}
+
+impl Mul for Affine {
+    type Output = Affine;
+
+    /// First the right one, then the left one.
+    fn mul(self, other: Affine) -> Affine {
+        Affine(self.0 * other.0)
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    #[test]
+    fn order_is_scale_turns_shift() {
+        let quarter = core::f64::consts::FRAC_PI_2;
+        let a = Affine::new(DVec3::new(1.0, 2.0, 3.0), DVec3::new(quarter, 0.0, quarter), DVec3::new(2.0, 3.0, 4.0));
+        // (1, 1, 1) is scaled to (2, 3, 4), turned round x to (2, -4, 3), round z to (4, 2, 3), shifted to (5, 4, 6).
+        assert!((a.point(DVec3::ONE) - DVec3::new(5.0, 4.0, 6.0)).length() < 1e-14);
+        let rotation = DVec3::new(0.3, -0.7, 1.1);
+        let m = Affine::new(DVec3::ZERO, rotation, DVec3::ONE).0.matrix3;
+        let expected = DMat3::from_rotation_z(1.1) * DMat3::from_rotation_y(-0.7) * DMat3::from_rotation_x(0.3);
+        assert!((m - expected).to_cols_array().iter().all(|x| x.abs() < 1e-14));
+    }
+
+    #[test]
+    fn inverse_and_composition() {
+        let a = Affine::new(DVec3::new(1.0, -2.0, 0.5), DVec3::new(0.3, 0.2, -0.5), DVec3::new(1.5, 0.5, 2.0));
+        let p = DVec3::new(0.3, 0.4, 0.5);
+        let back = a.inverse().unwrap() * a;
+        assert!((back.point(p) - p).length() < 1e-13);
+        assert!(Affine::new(DVec3::ZERO, DVec3::ZERO, DVec3::new(1.0, 0.0, 1.0)).inverse().is_none());
+    }
+
+    #[test]
+    fn normals_stay_perpendicular_and_outward() {
+        for scale in [DVec3::new(1.0, 3.0, 0.5), DVec3::new(-1.0, 1.0, 2.0)] {
+            let a = Affine::new(DVec3::ZERO, DVec3::new(0.4, 1.0, -0.3), scale);
+            let (n, t) = (DVec3::new(0.6, 0.8, 0.0), DVec3::new(0.8, -0.6, 0.7));
+            let (m, u) = (a.normal_matrix() * n, a.0.matrix3 * t);
+            assert!(m.dot(u).abs() < 1e-12);
+            assert!(m.dot(a.0.matrix3 * n) > 0.0, "points the same way as the image of the outside");
+        }
+    }
+}

@@ -1,0 +1,34 @@
+//! Axis-aligned boxes.
+
+use glam::DVec3;
+
+/// An axis-aligned box, both corners included.
+#[derive(Clone, Copy, Debug, PartialEq)]
+pub struct Bounds {
+    /// The corner with the least coordinates.
+    pub min: DVec3,
+    /// The corner with the greatest.
+    pub max: DVec3,
+}
+
+impl Bounds {
+    /// The smallest box around some points; `None` without any.
+    pub fn around(points: impl IntoIterator<Item = DVec3>) -> Option<Bounds> {
+        points.into_iter().fold(None, |b: Option<Bounds>, p| {
+            Some(match b {
+                None => Bounds { min: p, max: p },
+                Some(b) => Bounds { min: b.min.min(p), max: b.max.max(p) },
+            })
+        })
+    }
+
+    /// The centre.
+    pub fn centre(&self) -> DVec3 {
+        0.5 * (self.min + self.max)
+    }
+
+    /// The edge lengths.
+    pub fn size(&self) -> DVec3 {
+        self.max - self.min
+    }
+}

@@ -1,0 +1,40 @@
+//! Boxes.
+
+use super::{GeomError, Mesh};
+use glam::{DVec3, Vec3};
+
+/// A box round the origin with these edge lengths.
+///
+/// # Errors
+/// Unless all are positive and finite.
+pub fn cuboid(size: DVec3) -> Result<Mesh, GeomError> {
+    if !(size.is_finite() && size.min_element() > 0.0 && size.max_element() < 1e6) {
+        return Err(GeomError::domain(format!("box: the edge lengths must be positive, got {size}")));
+    }
+    let half = (0.5 * size).as_vec3();
+    let corner = |i: u32| Vec3::from_array([0, 1, 2].map(|a| if i >> a & 1 == 1 { half[a] } else { -half[a] }));
+    let positions: Vec<Vec3> = (0..8).map(corner).collect();
+    // Bit 0 is x, bit 1 y, bit 2 z; quads counter-clockwise from outside.
+    let quads = [[0, 4, 6, 2], [1, 3, 7, 5], [0, 1, 5, 4], [2, 6, 7, 3], [0, 2, 3, 1], [4, 5, 7, 6]];
+    let triangles: Vec<[u32; 3]> = quads.iter().flat_map(|q| [[q[0], q[1], q[2]], [q[0], q[2], q[3]]]).collect();
+    Mesh::new(positions, triangles, vec![0; 12])
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    #[test]
+    fn a_box_has_flat_sides_and_twelve_creases() {
+        let m = cuboid(DVec3::new(1.0, 2.0, 3.0)).unwrap();
+        assert_eq!((m.positions.len(), m.topology.triangles.len()), (24, 12));
+        assert_eq!(m.topology.edges.iter().filter(|e| e.crease).count(), 12);
+        for t in &m.topology.triangles {
+            let p = t.map(|v| m.positions[v as usize]);
+            let n = (p[1] - p[0]).cross(p[2] - p[0]).normalize();
+            assert!(n.dot(p[0]) > 0.0, "faces outwards");
+            assert!(t.iter().all(|v| (m.normals[*v as usize] - n).length() < 1e-6));
+        }
+        assert!(cuboid(DVec3::new(1.0, 0.0, 1.0)).is_err() && cuboid(DVec3::splat(f64::INFINITY)).is_err());
+    }
+}

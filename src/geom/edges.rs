@@ -1,0 +1,121 @@
+//! From loose triangles to a mesh: welding, the table of edges, creases, smooth normals.
+
+use super::mesh::CREASE_DEGREES;
+use super::{Edge, Mesh, NO_FACE, Topology};
+use glam::{DVec3, Vec3};
+use rustc_hash::FxHashMap;
+use std::sync::Arc;
+
+/// Builds a mesh; `None` if no triangle has an area.
+pub(super) fn build(positions: &[Vec3], triangles: &[[u32; 3]], parts: &[u16]) -> Option<Mesh> {
+    let weld = weld(positions);
+    let mut faces = Vec::new();
+    let mut kept_parts = Vec::new();
+    let mut normals = Vec::new();
+    for (t, part) in triangles.iter().zip(parts) {
+        let w = t.map(|v| weld[v as usize]);
+        if w[0] == w[1] || w[1] == w[2] || w[2] == w[0] {
+            continue;
+        }
+        let p = w.map(|v| positions[v as usize].as_dvec3());
+        let n = (p[1] - p[0]).cross(p[2] - p[0]);
+        if n.length_squared() > 0.0 {
+            faces.push(w);
+            kept_parts.push(*part);
+            normals.push(n.normalize());
+        }
+    }
+    if faces.is_empty() {
+        return None;
+    }
+    let edges = pair_edges(&faces, |a, b| normals[a].dot(normals[b]) < libm::cos(CREASE_DEGREES.to_radians()));
+    let groups = smoothing_groups(&faces, &edges);
+
+    // One vertex for each point and smoothing group around it.
+    let mut index: FxHashMap<(u32, u32), u32> = FxHashMap::default();
+    let (mut out_positions, mut sums) = (Vec::new(), Vec::<DVec3>::new());
+    let mut out = Vec::with_capacity(faces.len());
+    for (f, w) in faces.iter().enumerate() {
+        let corners = [0, 1, 2].map(|c| {
+            let vertex = *index.entry((w[c], groups[f * 3 + c])).or_insert_with(|| {
+                out_positions.push(positions[w[c] as usize]);
+                sums.push(DVec3::ZERO);
+                sums.len() as u32 - 1
+            });
+            let at = |k: usize| positions[w[(c + k) % 3] as usize].as_dvec3();
+            let (u, v) = ((at(1) - at(0)).normalize_or_zero(), (at(2) - at(0)).normalize_or_zero());
+            sums[vertex as usize] += normals[f] * libm::acos(u.dot(v).clamp(-1.0, 1.0));
+            vertex
+        });
+        out.push(corners);
+    }
+    let out_normals = sums.iter().map(|n| n.normalize_or(DVec3::Y).as_vec3()).collect();
+    let edges = edges
+        .into_iter()
+        .map(|(f, c, g, crease)| Edge { vertices: [out[f][c], out[f][(c + 1) % 3]], faces: [f as u32, g], crease })
+        .collect();
+    let part_count = kept_parts.iter().max().map_or(0, |p| p.saturating_add(1));
+    let topology = Topology { triangles: out, parts: kept_parts, part_count, edges };
+    Some(Mesh { positions: out_positions, normals: out_normals, topology: Arc::new(topology) })
+}
+
+/// For each vertex the first one at the same position.
+fn weld(positions: &[Vec3]) -> Vec<u32> {
+    let mut first: FxHashMap<[u32; 3], u32> = FxHashMap::default();
+    let key = |p: &Vec3| [p.x, p.y, p.z].map(|x| (x + 0.0).to_bits());
+    positions.iter().enumerate().map(|(i, p)| *first.entry(key(p)).or_insert(i as u32)).collect()
+}
+
+/// Every edge once: its first face and corner there, its second face, and whether it is a crease. More than two faces at an
+/// edge make pairs; one left over makes a boundary.
+pub(super) fn pair_edges(
+    faces: &[[u32; 3]],
+    is_crease: impl Fn(usize, usize) -> bool,
+) -> Vec<(usize, usize, u32, bool)> {
+    let mut open: FxHashMap<(u32, u32), usize> = FxHashMap::default();
+    let mut edges: Vec<(usize, usize, u32, bool)> = Vec::with_capacity(faces.len() * 3 / 2);
+    for (f, w) in faces.iter().enumerate() {
+        for c in 0..3 {
+            let (a, b) = (w[c], w[(c + 1) % 3]);
+            let key = (a.min(b), a.max(b));
+            match open.remove(&key) {
+                Some(e) => {
+                    let first = edges[e].0;
+                    edges[e].2 = f as u32;
+                    edges[e].3 = is_crease(first, f);
+                }
+                None => {
+                    open.insert(key, edges.len());
+                    edges.push((f, c, NO_FACE, false));
+                }
+            }
+        }
+    }
+    edges
+}
+
+/// For each corner of each face the number of its smoothing group: corners at one point belong together if a way round the
+/// point joins their faces without crossing a crease.
+fn smoothing_groups(faces: &[[u32; 3]], edges: &[(usize, usize, u32, bool)]) -> Vec<u32> {
+    let mut parent: Vec<u32> = (0..faces.len() as u32 * 3).collect();
+    fn root(parent: &mut [u32], mut x: u32) -> u32 {
+        while parent[x as usize] != x {
+            parent[x as usize] = parent[parent[x as usize] as usize];
+            x = parent[x as usize];
+        }
+        x
+    }
+    for (f, c, g, crease) in edges {
+        if *g == NO_FACE || *crease {
+            continue;
+        }
+        for corner in [*c, (c + 1) % 3] {
+            let point = faces[*f][corner];
+            if let Some(other) = faces[*g as usize].iter().position(|w| *w == point) {
+                let (a, b) = (root(&mut parent, (f * 3 + corner) as u32), root(&mut parent, g * 3 + other as u32));
+                parent[a.max(b) as usize] = a.min(b);
+            }
+        }
+    }
+    (0..parent.len() as u32).map(|x| root(&mut parent, x)).collect()
+}

@@ -1,0 +1,111 @@
+//! Triangle meshes with smooth normals, part numbers and a table of edges.
+//!
+//! Immutable, shared by `Arc`. Vertices are split where a crease runs, so that each has one normal; edges know the faces on
+//! both sides across such splits. Meshes of one shape share their [`Topology`].
+
+use super::edges;
+use super::{Bounds, GeomError};
+use glam::Vec3;
+use std::sync::Arc;
+
+/// In [`Edge::faces`]: there is no second face.
+pub const NO_FACE: u32 = u32::MAX;
+
+/// An edge.
+#[derive(Clone, Copy, Debug, PartialEq, Eq)]
+pub struct Edge {
+    /// Its ends, vertices of the first face.
+    pub vertices: [u32; 2],
+    /// The faces beside it; the second is [`NO_FACE`] on a boundary.
+    pub faces: [u32; 2],
+    /// Whether the surface turns sharply here.
+    pub crease: bool,
+}
+
+/// What stays the same when a mesh's vertices move.
+#[derive(Clone, Debug, Default, PartialEq)]
+pub struct Topology {
+    /// The triangles, counter-clockwise seen from outside.
+    pub triangles: Vec<[u32; 3]>,
+    /// The part of each triangle.
+    pub parts: Vec<u16>,
+    /// The number of parts.
+    pub part_count: u16,
+    /// Every edge once.
+    pub edges: Vec<Edge>,
+}
+
+/// A triangle mesh.
+#[derive(Clone, Debug, PartialEq)]
+pub struct Mesh {
+    /// The vertices.
+    pub positions: Vec<Vec3>,
+    /// A unit normal for each vertex.
+    pub normals: Vec<Vec3>,
+    /// How they are joined.
+    pub topology: Arc<Topology>,
+}
+
+/// Faces that meet at a greater angle than this do not blend into each other.
+pub const CREASE_DEGREES: f64 = 40.0;
+/// The largest mesh, in triangles.
+pub const MOST_TRIANGLES: usize = 5_000_000;
+
+impl Mesh {
+    /// A mesh from positions and triangles, with the part of each triangle. Equal positions are one point; triangles
+    /// without area are dropped; normals are means over the faces around a point, weighted by angle, within creases.
+    ///
+    /// # Errors
+    /// If a position is not finite, an index out of range, nothing is left, or there are more than five million triangles.
+    pub fn new(positions: Vec<Vec3>, triangles: Vec<[u32; 3]>, parts: Vec<u16>) -> Result<Mesh, GeomError> {
+        if triangles.len() > MOST_TRIANGLES {
+            return Err(GeomError::invalid(format!(
+                "a mesh of {} triangles; at most {MOST_TRIANGLES}",
+                triangles.len()
+            )));
+        }
+        if parts.len() != triangles.len() {
+            return Err(GeomError::invalid("a mesh needs one part number for each triangle"));
+        }
+        if let Some(i) = positions.iter().position(|p| !p.is_finite()) {
+            return Err(GeomError::invalid(format!("vertex {i} of the mesh is not finite: {}", positions[i])));
+        }
+        if let Some(i) = triangles.iter().position(|t| t.iter().any(|v| *v as usize >= positions.len())) {
+            let t = triangles[i];
+            let message = format!("triangle {i} of the mesh uses vertices {t:?}, but there are {}", positions.len());
+            return Err(GeomError::invalid(message));
+        }
+        edges::build(&positions, &triangles, &parts)
+            .ok_or_else(|| GeomError::invalid("the mesh has no triangle with an area"))
+    }
+
+    /// The smallest box around it.
+    pub fn bounds(&self) -> Option<Bounds> {
+        Bounds::around(self.positions.iter().map(|p| p.as_dvec3()))
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    #[test]
+    fn bad_meshes_are_refused() {
+        let p = vec![Vec3::ZERO, Vec3::X, Vec3::Y];
+        assert!(Mesh::new(p.clone(), vec![[0, 1, 2]], vec![0]).is_ok());
+        let e = Mesh::new(p.clone(), vec![[0, 1, 3]], vec![0]).unwrap_err().to_string();
+        assert_eq!(e, "triangle 0 of the mesh uses vertices [0, 1, 3], but there are 3");
+        assert!(Mesh::new(p.clone(), vec![[0, 1, 1]], vec![0]).is_err());
+        assert!(Mesh::new(vec![Vec3::ZERO, Vec3::X, Vec3::new(0.0, f32::NAN, 0.0)], vec![[0, 1, 2]], vec![0]).is_err());
+        assert!(Mesh::new(p.clone(), vec![], vec![]).is_err());
+        assert!(Mesh::new(p, vec![[0, 1, 2]], vec![]).is_err());
+    }
+
+    #[test]
+    fn a_single_triangle_has_three_boundary_edges() {
+        let m = Mesh::new(vec![Vec3::ZERO, Vec3::X, Vec3::Y], vec![[0, 1, 2]], vec![0]).unwrap();
+        assert_eq!(m.topology.edges.len(), 3);
+        assert!(m.topology.edges.iter().all(|e| e.faces[1] == NO_FACE));
+        assert!(m.normals.iter().all(|n| (*n - Vec3::Z).length() < 1e-6));
+    }
+}

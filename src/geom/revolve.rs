@@ -1,0 +1,160 @@
+//! Surfaces of revolution round the y axis, from a path in the half plane (r, y).
+//!
+//! The path runs with the outside on its right: up along an outer wall, inwards over a top. It is cut into strips that are
+//! smooth in themselves; between strips the surface has a crease. Topology depends on the numbers of points only and is
+//! shared between surfaces of the same numbers: positions and normals are all that a new profile costs.
+
+use super::edges::pair_edges;
+use super::{Edge, Mesh, Topology};
+use glam::Vec3;
+use std::cell::RefCell;
+use std::sync::Arc;
+
+/// A smooth piece of the path.
+#[derive(Clone, Debug, Default)]
+pub(super) struct Strip {
+    /// Points (r, y); consecutive ones differ. Radius 0 is a pole and allowed at the very ends of the strip only.
+    pub points: Vec<(f64, f64)>,
+    /// The part of each segment.
+    pub parts: Vec<u16>,
+}
+
+/// What the topology of a surface depends on.
+#[derive(Clone, Debug, PartialEq, Eq)]
+struct Signature {
+    sides: u32,
+    closed: bool,
+    part_count: u16,
+    /// For each strip: points, pole at its start, pole at its end; then the parts of its segments.
+    strips: Vec<u32>,
+}
+
+/// Sweeps strips, each beginning where the one before ends; `closed` joins the last to the first.
+pub(super) fn revolve(strips: &[Strip], sides: u32, closed: bool, part_count: u16) -> Mesh {
+    let signature = signature(strips, sides, closed, part_count);
+    let topology = cached(&signature, || topology(strips, sides, closed, part_count));
+    let n = sides as usize;
+    let circle: Vec<(f64, f64)> = (0..n)
+        .map(|k| {
+            let angle = core::f64::consts::TAU * k as f64 / n as f64;
+            (libm::cos(angle), libm::sin(angle))
+        })
+        .collect();
+    let count: usize = strips.iter().map(|s| s.points.len() * n).sum();
+    let (mut positions, mut normals) = (Vec::with_capacity(count), Vec::with_capacity(count));
+    for s in strips {
+        let last = s.points.len() - 1;
+        for (i, (r, y)) in s.points.iter().enumerate() {
+            let (a, b) = (s.points[i.saturating_sub(1)], s.points[(i + 1).min(last)]);
+            // The outside is on the right of the path's direction (dr, dy).
+            let (nr, ny) = (b.1 - a.1, -(b.0 - a.0));
+            let length = libm::hypot(nr, ny);
+            let (nr, ny) = if length > 0.0 { (nr / length, ny / length) } else { (1.0, 0.0) };
+            if *r == 0.0 {
+                positions.push(Vec3::new(0.0, *y as f32, 0.0));
+                normals.push(Vec3::new(0.0, if ny < 0.0 { -1.0 } else { 1.0 }, 0.0));
+                continue;
+            }
+            for (c, s) in &circle {
+                positions.push(Vec3::new((r * c) as f32, *y as f32, (r * s) as f32));
+                normals.push(Vec3::new((nr * c) as f32, ny as f32, (nr * s) as f32));
+            }
+        }
+    }
+    Mesh { positions, normals, topology }
+}
+
+fn signature(strips: &[Strip], sides: u32, closed: bool, part_count: u16) -> Signature {
+    let mut numbers = Vec::new();
+    for s in strips {
+        let pole = |p: Option<&(f64, f64)>| u32::from(p.is_some_and(|p| p.0 == 0.0));
+        numbers.extend([s.points.len() as u32, pole(s.points.first()), pole(s.points.last())]);
+        numbers.extend(s.parts.iter().map(|p| u32::from(*p)));
+    }
+    Signature { sides, closed, part_count, strips: numbers }
+}
+
+/// The topologies used last: results do not depend on what is in here.
+const KEPT: usize = 16;
+thread_local! {
+    static CACHE: RefCell<Vec<(Signature, Arc<Topology>)>> = const { RefCell::new(Vec::new()) };
+}
+
+fn cached(signature: &Signature, make: impl FnOnce() -> Topology) -> Arc<Topology> {
+    CACHE.with_borrow_mut(|cache| {
+        if let Some(i) = cache.iter().position(|(s, _)| s == signature) {
+            return Arc::clone(&cache[i].1);
+        }
+        let made = Arc::new(make());
+        if cache.len() == KEPT {
+            cache.remove(0);
+        }
+        cache.push((signature.clone(), Arc::clone(&made)));
+        made
+    })
+}
+
+fn topology(strips: &[Strip], sides: u32, closed: bool, part_count: u16) -> Topology {
+    let mut triangles: Vec<[u32; 3]> = Vec::new();
+    let mut parts = Vec::new();
+    // For each vertex the point of the surface it stands for, and the strip of each face.
+    let mut weld: Vec<u32> = Vec::new();
+    let mut strip_of = Vec::new();
+    let mut end: Option<Vec<u32>> = None;
+    for (si, s) in strips.iter().enumerate() {
+        let rings: Vec<(u32, u32)> = s
+            .points
+            .iter()
+            .map(|p| {
+                let first = weld.len() as u32;
+                let count = if p.0 == 0.0 { 1 } else { sides };
+                weld.extend(first..first + count);
+                (first, count)
+            })
+            .collect();
+        // The first ring lies on the last one of the strip before.
+        if let (Some(end), Some((first, count))) = (&end, rings.first())
+            && end.len() == *count as usize
+        {
+            for (k, w) in end.iter().enumerate() {
+                weld[*first as usize + k] = *w;
+            }
+        }
+        for (i, part) in s.parts.iter().enumerate() {
+            let ((a0, na), (b0, nb)) = (rings[i], rings[i + 1]);
+            for k in 0..sides {
+                let next = (k + 1) % sides;
+                let (a, b) = if na == 1 { (a0, a0) } else { (a0 + k, a0 + next) };
+                let (d, c) = if nb == 1 { (b0, b0) } else { (b0 + k, b0 + next) };
+                if nb != 1 {
+                    triangles.push([a, d, c]);
+                    parts.push(*part);
+                    strip_of.push(si);
+                }
+                if na != 1 {
+                    triangles.push([a, c, b]);
+                    parts.push(*part);
+                    strip_of.push(si);
+                }
+            }
+        }
+        end = rings.last().map(|(first, count)| (*first..first + count).map(|v| weld[v as usize]).collect());
+    }
+    if closed && let Some(end) = end {
+        // The last ring is the first one: its points take their names, wherever they are used.
+        for (k, w) in end.iter().enumerate() {
+            let first = k as u32;
+            weld.iter_mut().filter(|x| **x == *w).for_each(|x| *x = first);
+        }
+    }
+    let welded: Vec<[u32; 3]> = triangles.iter().map(|t| t.map(|v| weld[v as usize])).collect();
+    let edges = pair_edges(&welded, |a, b| strip_of[a] != strip_of[b])
+        .into_iter()
+        .map(|(f, c, g, crease)| Edge {
+            vertices: [triangles[f][c], triangles[f][(c + 1) % 3]],
+            faces: [f as u32, g],
+            crease,
+        })
+        .collect();
+    Topology { triangles, parts, part_count, edges }
+}

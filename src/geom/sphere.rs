@@ -1,0 +1,41 @@
+//! Spheres.
+
+use super::revolve::{Strip, revolve};
+use super::{GeomError, Mesh};
+
+/// A sphere round the origin with `sides` meridians and half as many rings.
+///
+/// # Errors
+/// Unless the radius is positive and finite, and there are 4 to 1024 sides.
+pub fn sphere(radius: f64, sides: u32) -> Result<Mesh, GeomError> {
+    if !(radius > 0.0 && radius < 1e6) {
+        return Err(GeomError::domain(format!("sphere: the radius must be positive, got {radius}")));
+    }
+    if !(4..=1024).contains(&sides) {
+        return Err(GeomError::domain(format!("sphere: 4 to 1024 sides, got {sides}")));
+    }
+    let rings = sides.div_ceil(2);
+    let points = (0..=rings).map(|i| {
+        let angle = core::f64::consts::PI * (f64::from(i) / f64::from(rings) - 0.5);
+        let r = if i == 0 || i == rings { 0.0 } else { radius * libm::cos(angle) };
+        (r, radius * libm::sin(angle))
+    });
+    let strip = Strip { points: points.collect(), parts: vec![0; rings as usize] };
+    Ok(revolve(&[strip], sides, false, 1))
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    #[test]
+    fn positions_and_normals_lie_on_the_sphere() {
+        let s = sphere(2.0, 32).unwrap();
+        for (p, n) in s.positions.iter().zip(&s.normals) {
+            assert!((p.length() - 2.0).abs() < 1e-5);
+            assert!((*p / 2.0 - *n).length() < 1e-5, "{p} {n}");
+        }
+        assert!(s.topology.edges.iter().all(|e| !e.crease && e.faces[1] != crate::geom::NO_FACE));
+        assert!(sphere(0.0, 32).is_err() && sphere(f64::NAN, 32).is_err() && sphere(1.0, 3).is_err());
+    }
+}

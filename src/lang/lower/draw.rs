@@ -1,0 +1,209 @@
+//! Random choices: `x ~ d`, and `t[k] ~ d` with the container `t` around its elements.
+
+use super::scope::{Meaning, ScopeKind};
+use super::{AddHint, Lowerer, Typed};
+use crate::lang::builtins::Type;
+use crate::lang::code::{DistSpec, Op, Operand, Slot, Source, SourceKey};
+use crate::syntax::ast::{Expr, ExprKind, Name, Stmt, StmtKind, Tag};
+use crate::syntax::print_expr;
+use crate::syntax::span::Span;
+use std::sync::Arc;
+
+impl Lowerer<'_> {
+    /// `x ~ d`: gives the choice.
+    pub fn named_draw(&mut self, name: &Name, dist: &Expr, tags: &[Tag], span: Span) -> Typed {
+        let spec = self.below(&name.node, |l| l.dist_spec(dist, false));
+        let tags = self.tags(tags);
+        let ty = self.drawn_type(&spec);
+        let site = self.site(&name.node, tags, 0);
+        let slot = self.push(Op::Draw { dist: spec, site, keys: Box::default() }, span);
+        Typed { at: Operand::Local(slot), ty }
+    }
+
+    /// What a family draws, where it can be told.
+    fn drawn_type(&self, d: &DistSpec) -> Type {
+        match d {
+            DistSpec::Family { builtin, .. } => match self.code.builtins.get(*builtin).name {
+                "flip" => Type::Any,
+                "dirichlet" | "mv_normal" | "gp" => Type::Array,
+                "iid" => Type::Any,
+                // A parameter that is an array makes the choice one.
+                _ => Type::Nums,
+            },
+            DistSpec::Value(_) => Type::Any,
+        }
+    }
+
+    /// `t[k] ~ d`.
+    pub fn keyed_draw(&mut self, target: &Expr, dist: &Expr, tags: &[Tag], span: Span) {
+        let Some((name, keys)) = keyed_target(target) else {
+            self.error("a choice is drawn into a name or an element", target.span, "expected `x` or `t[k]`");
+            return;
+        };
+        if !self.in_loop() {
+            self.declare_container(&name);
+        }
+        let Some((binding, up)) = self.lookup(&name.node) else { return };
+        let Meaning::Container(container) = binding.meaning else {
+            self.not_a_container(&name, binding.span);
+            return;
+        };
+        let spec = self.below(&name.node, |l| l.dist_spec(dist, false));
+        let operands: Vec<Operand> = keys.iter().map(|k| self.expr(k).at).collect();
+        let tags = self.tags(tags);
+
+        // Which enclosing loops have their variable among the keys.
+        let loops = self.loops_here();
+        let variables: Vec<Arc<str>> = loops
+            .iter()
+            .filter_map(|i| match &self.scopes[*i].kind {
+                ScopeKind::Loop { var, .. } => Some(Arc::clone(var)),
+                _ => None,
+            })
+            .collect();
+        let loop_of = |k: &Expr| match &k.kind {
+            ExprKind::Var(v) => variables.iter().rposition(|x| x == v),
+            _ => None,
+        };
+        let plain = keys.len() == loops.len() && keys.iter().enumerate().all(|(i, k)| loop_of(k) == Some(i));
+        let carried = if plain {
+            0
+        } else {
+            let n = loops.len();
+            keys.iter()
+                .filter_map(|k| loop_of(k))
+                .fold(0u32, |bits, i| bits | 1u32.checked_shl((n - 1 - i) as u32).unwrap_or(0))
+        };
+        let own: Box<[Operand]> = if plain { Box::default() } else { operands.clone().into() };
+        let site = self.site(&name.node, tags, carried);
+        let slot = self.push(Op::Draw { dist: spec, site, keys: own }, span);
+        let written = keys.iter().map(|k| format!("[{}]", print_expr(k))).collect::<String>();
+
+        // The loops between the container and the draw.
+        let outside = self.scopes.len() - 1 - up as usize;
+        let inner: Vec<usize> = loops.iter().copied().filter(|i| *i > outside).collect();
+        let through: Box<[Slot]> = inner
+            .iter()
+            .filter_map(|i| match self.scopes[*i].kind {
+                ScopeKind::Loop { at, .. } => Some(at),
+                _ => None,
+            })
+            .collect();
+        let skipped = loops.len() - inner.len();
+        let source_keys = keys
+            .iter()
+            .zip(&operands)
+            .map(|(k, o)| match loop_of(k) {
+                Some(i) if i >= skipped => SourceKey::Loop((i - skipped) as u32),
+                _ => SourceKey::Operand(*o),
+            })
+            .collect();
+        let source = Source { loops: through, draw: slot, keys: source_keys };
+        let home = self.scopes[outside].block;
+        if let Op::Container { sources, .. } = &mut self.code.blocks[home as usize].ops[container as usize] {
+            let mut all = std::mem::take(sources).into_vec();
+            all.push(source);
+            *sources = all.into();
+        }
+        let last = self.scopes.len() - 1;
+        let scope = &mut self.scopes[last];
+        if scope.drawn.iter().any(|(n, w, _)| *n == name.node && *w == written) {
+            self.error(format!("`{}{written}` is drawn twice", name.node), target.span, "a second draw at one address")
+                .hint_also("every choice needs an address of its own: another key, or another name");
+            return;
+        }
+        scope.drawn.push((name.node, written, slot));
+    }
+
+    /// Declares the containers that statements of this block, and loops in them, draw into.
+    pub fn declare_containers(&mut self, stmts: &[Stmt]) {
+        if self.in_loop() {
+            return;
+        }
+        let mut names = Vec::new();
+        find_targets(stmts, &mut names);
+        for name in names {
+            self.declare_container(&name);
+        }
+    }
+
+    /// Whether the innermost block is a loop's: its containers belong to a block further out.
+    fn in_loop(&self) -> bool {
+        self.scopes.last().is_some_and(|s| matches!(s.kind, ScopeKind::Loop { .. }))
+    }
+
+    fn declare_container(&mut self, name: &Name) {
+        let here = if self.scopes.len() == 1 {
+            self.modules[self.module].names.get(&name.node)
+        } else {
+            self.scopes.last().and_then(|s| s.names.get(&name.node))
+        };
+        match here.copied() {
+            None => {
+                let op = Op::Container { name: Arc::clone(&name.node), sources: Box::default() };
+                let slot = self.push(op, name.span);
+                self.push(Op::Gather, name.span);
+                self.bind(name, Meaning::Container(slot), Type::Any);
+                if self.scopes.len() == 1 {
+                    let global = self.global_name(name);
+                    self.code.globals.insert(global, Operand::Local(slot));
+                }
+            }
+            Some(b) if matches!(b.meaning, Meaning::Container(_)) => {}
+            Some(b) => self.not_a_container(name, b.span),
+        }
+    }
+
+    fn not_a_container(&mut self, name: &Name, bound: Span) {
+        let message = format!("`{}` is a name already and cannot hold keyed choices too", name.node);
+        let e = self.error(message, name.span, "drawn into as a container");
+        e.point_at(bound, "bound here");
+        e.hint_also("call the container something else");
+    }
+
+    /// The slot that an element was drawn into, if `base[keys]` is written exactly as where it was drawn, in this pass.
+    pub fn drawn_here(&self, name: &str, written: &str) -> Option<Operand> {
+        for (up, scope) in self.scopes.iter().rev().enumerate() {
+            if let Some((_, _, slot)) = scope.drawn.iter().find(|(n, w, _)| &**n == name && w == written) {
+                return Some(Self::reach(Operand::Local(*slot), up as u16));
+            }
+            let bound = match scope.kind {
+                ScopeKind::Root => self.modules[self.module].names.contains_key(name),
+                _ => scope.names.contains_key(name),
+            };
+            if bound {
+                return None;
+            }
+        }
+        None
+    }
+}
+
+/// The name and keys of `t[a][b]`.
+fn keyed_target(e: &Expr) -> Option<(Name, Vec<&Expr>)> {
+    match &e.kind {
+        ExprKind::Var(name) => Some((Name::new(Arc::clone(name), e.span), Vec::new())),
+        ExprKind::Index { base, index } => {
+            let (name, mut keys) = keyed_target(base)?;
+            keys.push(index);
+            Some((name, keys))
+        }
+        _ => None,
+    }
+}
+
+fn find_targets(stmts: &[Stmt], names: &mut Vec<Name>) {
+    for s in stmts {
+        match &s.kind {
+            StmtKind::Draw { target, .. } if matches!(target.kind, ExprKind::Index { .. }) => {
+                if let Some((name, _)) = keyed_target(target)
+                    && !names.iter().any(|n| n.node == name.node)
+                {
+                    names.push(name);
+                }
+            }
+            StmtKind::For { body, .. } => find_targets(body, names),
+            _ => {}
+        }
+    }
+}

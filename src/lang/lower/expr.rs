@@ -1,0 +1,382 @@
+//! Expressions.
+
+use super::scope::{Meaning, Scope, ScopeKind};
+use super::types::shown;
+use super::{AddHint, Lowerer, Typed};
+use crate::diag::nearest;
+use crate::lang::builtins::{Kind, Type};
+use crate::lang::code::{BlockKind, Op, Operand};
+use crate::lang::value::{Closure, Value};
+use crate::syntax::ast::{BinaryOp, Body, Expr, ExprKind, Lambda, Name, UnaryOp};
+use crate::syntax::print_expr;
+use crate::syntax::span::Span;
+use std::sync::Arc;
+
+impl Lowerer<'_> {
+    /// Lowers an expression into the present block.
+    pub fn expr(&mut self, e: &Expr) -> Typed {
+        match &e.kind {
+            ExprKind::Num(x) => self.constant(Value::Num(*x)),
+            ExprKind::Str(s) => self.constant(Value::Str(Arc::clone(s))),
+            ExprKind::Bool(b) => self.constant(Value::Bool(*b)),
+            ExprKind::Var(name) => self.variable(name, e.span),
+            ExprKind::Address(_) | ExprKind::TagSel { .. } => {
+                self.error("a selection of choices is no value of the model", e.span, "a selection")
+                    .hint_also("selections belong in inference blocks, `freeze` and `force`");
+                self.nothing()
+            }
+            ExprKind::Array(xs) => {
+                let items: Box<[Operand]> = xs.iter().map(|x| self.expr(x).at).collect();
+                if let Some(v) = self.constant_items(&items) {
+                    return self.constant(v);
+                }
+                self.op(Op::Array(items), Type::Array, e.span)
+            }
+            ExprKind::Record(fields) => self.record(fields, e.span),
+            ExprKind::Call { callee, args } => self.call(e, callee, args, None),
+            ExprKind::Index { .. } => self.index(e),
+            ExprKind::Field { base, field } => self.field(e, base, field),
+            ExprKind::Unary { op, expr } => {
+                let v = self.expr(expr);
+                let name = match op {
+                    UnaryOp::Neg => "neg",
+                    UnaryOp::Not => "not",
+                };
+                if let (UnaryOp::Neg, Operand::Const(i)) = (op, v.at)
+                    && let Value::Num(x) = self.code.const_value(i)
+                {
+                    let x = -*x;
+                    return self.constant(Value::Num(x));
+                }
+                self.operator(name, &[(v, expr.span)], e.span)
+            }
+            ExprKind::Binary { op, left, right } => self.binary(*op, left, right, e.span),
+            ExprKind::If { cond, then, otherwise } => self.if_else(cond, then, otherwise, e.span),
+            ExprKind::Lambda(l) => self.lambda(l, &Arc::from("fn"), e.span),
+            ExprKind::Error => self.nothing(),
+        }
+    }
+
+    /// Lowers an expression that gets a name: a function is called by it in addresses.
+    pub fn expr_named(&mut self, e: &Expr, name: &Arc<str>) -> Typed {
+        match &e.kind {
+            ExprKind::Lambda(l) => self.lambda(l, name, e.span),
+            ExprKind::Call { callee, args } => self.call(e, callee, args, Some(name)),
+            _ => self.expr(e),
+        }
+    }
+
+    pub fn op(&mut self, op: Op, ty: Type, span: Span) -> Typed {
+        let slot = self.push(op, span);
+        Typed { at: Operand::Local(slot), ty }
+    }
+
+    /// The array of constants, if all are.
+    fn constant_items(&self, items: &[Operand]) -> Option<Value> {
+        let values: Option<Vec<Value>> = items
+            .iter()
+            .map(|o| match o {
+                Operand::Const(i) => Some(self.code.const_value(*i).clone()),
+                _ => None,
+            })
+            .collect();
+        values.map(Value::from_elements)
+    }
+
+    pub fn variable(&mut self, name: &Arc<str>, span: Span) -> Typed {
+        if let Some((b, up)) = self.lookup(name) {
+            return match b.meaning {
+                Meaning::Value(o) => Typed { at: Self::reach(o, up), ty: b.ty },
+                Meaning::Container(slot) => Typed { at: Self::reach(Operand::Local(slot), up), ty: Type::Any },
+                Meaning::Function(block) => self.constant(Value::Closure(Closure { block, frame: 0 })),
+            };
+        }
+        if let Some(x) = self.code.builtins.constant(name) {
+            return self.constant(Value::Num(x));
+        }
+        if let Some(i) = self.find_builtin(name) {
+            match self.code.builtins.get(i).kind {
+                Kind::Function(_) | Kind::Distribution(_) => return self.constant(Value::Builtin(i)),
+                Kind::Form(_) => {
+                    self.error(format!("`{name}` can only be called"), span, "not a value")
+                        .hint_also(format!("wrap it in a function: fn(x) {{ {name}(…) }}"));
+                }
+                Kind::Inference => self.only_in_plans(name, span),
+            }
+            return self.nothing();
+        }
+        if self.modules[self.module].namespaces.contains_key(name) {
+            self.error(format!("`{name}` is a namespace, not a value"), span, "a namespace")
+                .hint_also(format!("write {name}.NAME"));
+            return self.nothing();
+        }
+        self.unbound(name, span);
+        self.nothing()
+    }
+
+    pub fn only_in_plans(&mut self, name: &str, span: Span) {
+        let message = format!("`{name}` belongs in an inference block");
+        self.error(message, span, "not a function of the model")
+            .hint_also(format!("infer {{ repeat 1000 {{ {name}(…); }} }}"));
+    }
+
+    /// A name nobody knows.
+    pub fn unbound(&mut self, name: &str, span: Span) {
+        let visible = self.visible();
+        let builtins = Arc::clone(&self.code.builtins);
+        let known = builtins
+            .iter()
+            .filter(|b| b.module.is_empty() && b.name.starts_with(|c: char| c.is_alphabetic()))
+            .filter(|b| !matches!(b.kind, Kind::Inference))
+            .map(|b| b.name);
+        let near = nearest(name, visible.iter().map(|n| &**n).chain(known)).map(str::to_owned);
+        // A name of a namespace, written without it.
+        let inside = self.modules[self.module].namespaces.iter().find_map(|(ns, space)| {
+            let module = &self.modules[space.module];
+            let native = module.native.as_deref().is_some_and(|m| builtins.find(m, name).is_some());
+            (native || module.names.contains_key(name)).then(|| format!("{ns}.{name}"))
+        });
+        let later = self.modules[self.module].names.get(name).map(|b| b.span);
+        let lives = builtins.iter().find(|b| b.name == name && !b.module.is_empty());
+        let lives = lives.map(|b| format!("include \"std/{0}.pcad\" as {0}; then write {0}.{name}", b.module));
+        let e = self.error(format!("unknown name `{name}`"), span, "not bound here");
+        if let Some(at) = later {
+            e.point_at(at, "bound later");
+        }
+        if let Some(hint) =
+            inside.map(|i| format!("did you mean `{i}`?")).or(near.map(|n| format!("did you mean `{n}`?"))).or(lives)
+        {
+            e.hint_also(hint);
+        }
+    }
+
+    fn record(&mut self, fields: &[(Name, Expr)], span: Span) -> Typed {
+        let mut names: Vec<Arc<str>> = Vec::with_capacity(fields.len());
+        let mut values = Vec::with_capacity(fields.len());
+        for (name, e) in fields {
+            if names.contains(&name.node) {
+                self.error(format!("the field `{}` is given twice", name.node), name.span, "again here");
+            }
+            names.push(Arc::clone(&name.node));
+            values.push(self.expr(e).at);
+        }
+        self.op(Op::Record { names: names.into(), values: values.into() }, Type::Record, span)
+    }
+
+    /// `a[i]`; all keys of a container in one step.
+    fn index(&mut self, e: &Expr) -> Typed {
+        let mut keys = Vec::new();
+        let mut base = e;
+        while let ExprKind::Index { base: b, index } = &base.kind {
+            keys.push(&**index);
+            base = b;
+        }
+        keys.reverse();
+        if let ExprKind::Var(name) = &base.kind
+            && let Some((binding, up)) = self.lookup(name)
+            && let Meaning::Container(slot) = binding.meaning
+        {
+            let written = keys.iter().map(|k| format!("[{}]", print_expr(k))).collect::<String>();
+            if let Some(o) = self.drawn_here(name, &written) {
+                return Typed { at: o, ty: Type::Any };
+            }
+            let keys = keys.iter().map(|k| self.expr(k).at).collect();
+            let base = Self::reach(Operand::Local(slot), up);
+            return self.op(Op::Index { base, keys }, Type::Any, e.span);
+        }
+        let mut value = self.expr(base);
+        for k in keys {
+            let key = self.expr(k);
+            if matches!(
+                value.ty,
+                Type::Num | Type::Int | Type::Bool | Type::Str | Type::Dist | Type::Function | Type::Likelihood
+            ) {
+                let message = format!("{} has no elements", shown(value.ty));
+                self.error(message, e.span, "cannot be indexed");
+                return self.nothing();
+            }
+            value = self.op(Op::Index { base: value.at, keys: [key.at].into() }, Type::Any, e.span);
+        }
+        value
+    }
+
+    fn field(&mut self, e: &Expr, base: &Expr, field: &Name) -> Typed {
+        if let ExprKind::Var(ns) = &base.kind
+            && self.lookup(ns).is_none()
+            && let Some(space) = self.modules[self.module].namespaces.get(ns).cloned()
+        {
+            return self.member(ns, space.module, field, e.span);
+        }
+        let value = self.expr(base);
+        if matches!(
+            value.ty,
+            Type::Num | Type::Int | Type::Bool | Type::Str | Type::Array | Type::Dist | Type::Function
+        ) {
+            let message = format!("{} has no field `{}`", shown(value.ty), field.node);
+            self.error(message, field.span, format!("this is asked of {}", shown(value.ty)));
+            return self.nothing();
+        }
+        let key = self.constant(Value::Str(Arc::clone(&field.node)));
+        self.op(Op::Index { base: value.at, keys: [key.at].into() }, Type::Any, e.span)
+    }
+
+    /// `ns.name` as a value.
+    fn member(&mut self, ns: &str, module: usize, field: &Name, span: Span) -> Typed {
+        if let Some(b) = self.modules[module].names.get(&field.node).copied() {
+            let up = (self.scopes.len() - 1) as u16;
+            return match b.meaning {
+                Meaning::Value(o) => Typed { at: Self::reach(o, up), ty: b.ty },
+                Meaning::Container(slot) => Typed { at: Self::reach(Operand::Local(slot), up), ty: Type::Any },
+                Meaning::Function(block) => self.constant(Value::Closure(Closure { block, frame: 0 })),
+            };
+        }
+        if let Some(native) = &self.modules[module].native
+            && let Some(i) = self.code.builtins.find(native, &field.node)
+        {
+            return self.constant(Value::Builtin(i));
+        }
+        self.no_member(ns, module, field);
+        let _ = span;
+        self.nothing()
+    }
+
+    pub fn no_member(&mut self, ns: &str, module: usize, field: &Name) {
+        let table = Arc::clone(&self.code.builtins);
+        let m = &self.modules[module];
+        let native = m.native.clone();
+        let own = m.names.keys().cloned().collect::<Vec<_>>();
+        let natives = table.iter().filter(|b| native.as_deref() == Some(b.module)).map(|b| b.name);
+        let known: Vec<&str> = own.iter().map(|n| &**n).chain(natives).collect();
+        let hint = match nearest(&field.node, known.iter().copied()) {
+            Some(n) => format!("did you mean `{ns}.{n}`?"),
+            None => format!("it has {}", known.join(", ")),
+        };
+        self.error(format!("`{ns}` has no `{}`", field.node), field.span, "unknown name").hint_also(hint);
+    }
+
+    /// The index of a built-in of the language, or of the native module whose file this is.
+    pub fn find_builtin(&self, name: &str) -> Option<u32> {
+        let native = self.modules[self.module].native.as_deref();
+        native.and_then(|m| self.code.builtins.find(m, name)).or_else(|| self.code.builtins.find("", name))
+    }
+
+    fn binary(&mut self, op: BinaryOp, left: &Expr, right: &Expr, span: Span) -> Typed {
+        match op {
+            BinaryOp::And | BinaryOp::Or => {
+                let cond = self.expr(left);
+                self.check_bool(cond, left.span, "`and` and `or` need bools");
+                let settled = self.constant(Value::Bool(op == BinaryOp::Or)).at;
+                let other = self.branch(|l| {
+                    let v = l.expr(right);
+                    l.check_bool(v, right.span, "`and` and `or` need bools");
+                    Some(v)
+                });
+                let fixed = self.branch(|_| Some(Typed { at: settled, ty: Type::Bool }));
+                let (then, otherwise) = if op == BinaryOp::And { (other.0, fixed.0) } else { (fixed.0, other.0) };
+                self.op(Op::If { cond: cond.at, then, otherwise }, Type::Bool, span)
+            }
+            BinaryOp::Intersect => {
+                self.error("`&` joins selections of choices", span, "not in the model")
+                    .hint_also("the logical connective is `and`");
+                self.nothing()
+            }
+            _ => {
+                let (a, b) = (self.expr(left), self.expr(right));
+                self.operator(operator_name(op), &[(a, left.span), (b, right.span)], span)
+            }
+        }
+    }
+
+    /// An operator of the table.
+    fn operator(&mut self, name: &str, args: &[(Typed, Span)], span: Span) -> Typed {
+        let Some(builtin) = self.code.builtins.find("", name) else { return self.nothing() };
+        if name != "==" && name != "!=" && name != "*" && name != "+" {
+            for (v, at) in args {
+                let number = matches!(v.ty, Type::Any | Type::Num | Type::Int | Type::Nums | Type::Array);
+                let fits = number || (name == "not" && v.ty == Type::Bool);
+                if !fits {
+                    let shown_op = if name == "neg" { "-" } else { name };
+                    let wanted = if name == "not" { "a bool" } else { "numbers or arrays of them" };
+                    let message = format!("`{shown_op}` needs {wanted}, got {}", shown(v.ty));
+                    self.error(message, *at, format!("this is {}", shown(v.ty)));
+                }
+            }
+        } else if matches!(name, "*" | "+") {
+            for (v, at) in args {
+                if matches!(v.ty, Type::Bool | Type::Function | Type::Dist | Type::Likelihood | Type::Record) {
+                    let message = format!("`{name}` needs numbers or arrays of them, got {}", shown(v.ty));
+                    let e = self.error(message, *at, format!("this is {}", shown(v.ty)));
+                    if v.ty == Type::Dist {
+                        e.hint_also("draw from it first: `let x = …` does not draw, `x ~ …` does");
+                    }
+                }
+            }
+        }
+        let comparison = matches!(name, "==" | "!=" | "<" | "<=" | ">" | ">=" | "not");
+        let all_numbers = args.iter().all(|(v, _)| matches!(v.ty, Type::Num | Type::Int));
+        let ty = match name {
+            "==" | "!=" => Type::Bool,
+            ".." => Type::Array,
+            _ if comparison && all_numbers => Type::Bool,
+            _ if all_numbers => Type::Num,
+            _ => Type::Any,
+        };
+        let args = args.iter().map(|(v, _)| v.at).collect();
+        self.op(Op::Prim { builtin, args }, ty, span)
+    }
+
+    pub fn check_bool(&mut self, v: Typed, span: Span, what: &str) {
+        if !matches!(v.ty, Type::Any | Type::Bool) {
+            let e = self.error(format!("{what}, got {}", shown(v.ty)), span, format!("this is {}", shown(v.ty)));
+            if matches!(v.ty, Type::Num | Type::Int | Type::Nums) {
+                e.hint_also("compare it, e.g. x != 0");
+            }
+        }
+    }
+
+    fn if_else(&mut self, cond: &Expr, then: &Body, otherwise: &Body, span: Span) -> Typed {
+        let c = self.expr(cond);
+        self.check_bool(c, cond.span, "`if` needs a bool");
+        let a = self.branch(|l| l.body_of(then));
+        let b = self.branch(|l| l.body_of(otherwise));
+        let ty = if a.1 == b.1 { a.1 } else { Type::Any };
+        self.op(Op::If { cond: c.at, then: a.0, otherwise: b.0 }, ty, span)
+    }
+
+    /// A block of its own that runs or not.
+    fn branch(&mut self, f: impl FnOnce(&mut Self) -> Option<Typed>) -> (u32, Type) {
+        let block = self.new_block(BlockKind::Branch);
+        self.scopes.push(Scope::new(block, ScopeKind::Branch));
+        let result = f(self);
+        self.scopes.pop();
+        // A constant or a slot further out is seen one level deeper from inside; `f` gave it as seen there.
+        self.code.blocks[block as usize].result = result.map(|t| t.at);
+        (block, result.map_or(Type::Any, |t| t.ty))
+    }
+
+    pub fn lambda(&mut self, l: &Lambda, name: &Arc<str>, span: Span) -> Typed {
+        let block = self.function_block(Arc::clone(name), l);
+        self.function_body(block, l);
+        self.op(Op::Closure(block), Type::Function, span)
+    }
+}
+
+/// The name of an operator in the table of built-ins.
+fn operator_name(op: BinaryOp) -> &'static str {
+    match op {
+        BinaryOp::Add => "+",
+        BinaryOp::Sub => "-",
+        BinaryOp::Mul => "*",
+        BinaryOp::Div => "/",
+        BinaryOp::Rem => "%",
+        BinaryOp::Pow => "**",
+        BinaryOp::Eq => "==",
+        BinaryOp::Ne => "!=",
+        BinaryOp::Lt => "<",
+        BinaryOp::Le => "<=",
+        BinaryOp::Gt => ">",
+        BinaryOp::Ge => ">=",
+        BinaryOp::Range => "..",
+        BinaryOp::Intersect | BinaryOp::And | BinaryOp::Or => "",
+    }
+}

@@ -1,0 +1,87 @@
+//! What a program wants from outside: its parameters and data, without lowering it.
+
+use crate::lang::load::Loaded;
+use crate::syntax::ast::{ExprKind, ItemKind};
+use crate::syntax::print_expr;
+
+/// A `param`.
+#[derive(Clone, Debug, PartialEq)]
+pub struct ParamItem {
+    /// Its name, with the namespace of an included file before a slash.
+    pub name: String,
+    /// The declared type.
+    pub ty: Option<String>,
+    /// The default as written.
+    pub default: Option<String>,
+    /// The help text.
+    pub help: Option<String>,
+}
+
+/// A `data` item.
+#[derive(Clone, Debug, PartialEq)]
+pub struct DataItem {
+    /// Its name.
+    pub name: String,
+    /// Its kind: as declared, or the kind its default reads.
+    pub ty: Option<String>,
+    /// Whether it has a default.
+    pub has_default: bool,
+    /// The help text.
+    pub help: Option<String>,
+}
+
+/// What a program wants from outside.
+#[derive(Clone, Debug, Default, PartialEq)]
+pub struct Interface {
+    /// Its parameters, in order.
+    pub params: Vec<ParamItem>,
+    /// Its data, in order.
+    pub data: Vec<DataItem>,
+}
+
+/// Reads a program's interface off its text.
+pub fn inspect(loaded: &Loaded) -> Interface {
+    let mut found = Interface::default();
+    if !loaded.units.is_empty() {
+        unit(loaded, 0, "", &mut found);
+    }
+    found
+}
+
+fn unit(loaded: &Loaded, index: usize, prefix: &str, found: &mut Interface) {
+    let unit_ = &loaded.units[index];
+    for (i, item) in unit_.program.items.iter().enumerate() {
+        match &item.kind {
+            ItemKind::Param(d) => found.params.push(ParamItem {
+                name: format!("{prefix}{}", d.name.node),
+                ty: d.ty.as_ref().map(|t| t.node.to_string()),
+                default: d.default.as_ref().map(print_expr),
+                help: d.help.as_ref().map(|h| h.node.to_string()),
+            }),
+            ItemKind::Data(d) => {
+                let read = d.default.as_ref().and_then(|e| match &e.kind {
+                    ExprKind::Call { callee, .. } => match &callee.kind {
+                        ExprKind::Var(kind) => Some(kind.to_string()),
+                        _ => None,
+                    },
+                    _ => None,
+                });
+                found.data.push(DataItem {
+                    name: format!("{prefix}{}", d.name.node),
+                    ty: d.ty.as_ref().map(|t| t.node.to_string()).or(read),
+                    has_default: d.default.is_some(),
+                    help: d.help.as_ref().map(|h| h.node.to_string()),
+                });
+            }
+            ItemKind::Include { alias, .. } => {
+                if let Some(inner) = unit_.includes.get(i).copied().flatten() {
+                    match alias {
+                        Some(a) => unit(loaded, inner, &format!("{}/", a.node), found),
+                        None => unit(loaded, inner, prefix, found),
+                    }
+                }
+            }
+            _ => {}
+        }
+    }
+}

@@ -1,0 +1,335 @@
+//! The top level of a file: includes, parameters, data, functions, statements.
+
+use super::scope::{Body, Meaning, Module, Namespace, Scope, ScopeKind};
+use super::types::{accepts, declared, shown};
+use super::{AddHint, Export, Lowerer, Pending, Plan, Report, Typed};
+use crate::diag::{IntoDiagnostic, nearest};
+use crate::lang::builtins::{Type, data};
+use crate::lang::code::{BlockKind, Op};
+use crate::lang::value::{Closure, Value};
+use crate::syntax::ast::{Declaration, Expr, ExprKind, FnDecl, Item, ItemKind, Lambda, Stmt, StmtKind};
+use crate::syntax::parse_expr;
+use std::sync::Arc;
+
+impl Lowerer<'_> {
+    /// Lowers a file into the current module.
+    pub fn unit(&mut self, index: usize) {
+        let loaded = self.loaded;
+        let unit = &loaded.units[index];
+        // Named functions first: they may be called before they are written.
+        for item in &unit.program.items {
+            if let ItemKind::Fn(f) = &item.kind {
+                self.declare(f);
+            }
+        }
+        let forgotten = self.forgotten(&unit.program.items);
+        for (i, item) in unit.program.items.iter().enumerate() {
+            if forgotten.contains(&i) {
+                continue;
+            }
+            match &item.kind {
+                ItemKind::Include { alias, path } => {
+                    let Some(included) = unit.includes.get(i).copied().flatten() else { continue };
+                    let native = path.node.strip_prefix("std/").and_then(|p| p.strip_suffix(".pcad")).map(Arc::from);
+                    match alias {
+                        Some(alias) => {
+                            let prefix = Some(Arc::clone(&alias.node));
+                            self.modules.push(Module { prefix, native, ..Module::default() });
+                            let module = self.modules.len() - 1;
+                            let space = Namespace { module, span: alias.span };
+                            let old = self.modules[self.module].namespaces.insert(Arc::clone(&alias.node), space);
+                            if let Some(old) = old {
+                                let message = format!("the namespace `{}` is used twice", alias.node);
+                                self.error(message, alias.span, "used again here")
+                                    .point_at(old.span, "first used here");
+                            }
+                            let outer = std::mem::replace(&mut self.module, module);
+                            self.unit(included);
+                            self.module = outer;
+                        }
+                        None => {
+                            if native.is_some() && self.modules[self.module].native.is_none() {
+                                self.modules[self.module].native = native;
+                            }
+                            self.unit(included);
+                        }
+                    }
+                }
+                ItemKind::Param(d) => self.param(d),
+                ItemKind::Data(d) => self.data(d, &unit.folder),
+                ItemKind::Fn(_) => {}
+                ItemKind::Kernel(k) => {
+                    if let Some(old) = self.kernels.insert(Arc::clone(&k.name.node), k.clone()) {
+                        let e = self.error(format!("the kernel `{}` is declared twice", k.name.node), k.name.span, "");
+                        e.point_at(old.name.span, "first here");
+                    }
+                }
+                // A plan of an included file is that file's own.
+                ItemKind::Infer { name, body } if index == 0 => {
+                    let name = name.as_ref().map(|n| Arc::clone(&n.node));
+                    self.plans.push(Plan { name, body: body.clone().into() });
+                }
+                ItemKind::Report { exprs, file } if index == 0 => {
+                    self.reports.push(Report { exprs: exprs.clone(), file: file.as_ref().map(super::text) });
+                }
+                ItemKind::Export { expr, file } if index == 0 => {
+                    self.exports.push(Export { expr: expr.clone(), file: super::text(file) });
+                }
+                ItemKind::Infer { .. } | ItemKind::Report { .. } | ItemKind::Export { .. } => {}
+                ItemKind::Stmt(s) => self.stmt(s),
+            }
+        }
+    }
+
+    /// The items that a later `forget` removes, and the `forget` statements themselves.
+    fn forgotten(&mut self, items: &[Item]) -> Vec<usize> {
+        let mut gone = Vec::new();
+        for (i, item) in items.iter().enumerate() {
+            let ItemKind::Stmt(Stmt { kind: StmtKind::Forget(e), .. }) = &item.kind else { continue };
+            gone.push(i);
+            let name = match &e.kind {
+                ExprKind::Var(name) => Some(Arc::clone(name)),
+                _ => None,
+            };
+            let Some(name) = name else {
+                self.error("`forget` takes the name of an observation or assume", e.span, "not a name");
+                continue;
+            };
+            let is_it = |item: &Item| match &item.kind {
+                ItemKind::Stmt(s) => match &s.kind {
+                    StmtKind::Assume { name: n, .. } | StmtKind::Predict { name: n, .. } => n.node == name,
+                    StmtKind::Observe { name: Some(n), .. } | StmtKind::Factor { name: Some(n), .. } => n.node == name,
+                    _ => false,
+                },
+                _ => false,
+            };
+            match (0..i).rev().find(|j| !gone.contains(j) && is_it(&items[*j])) {
+                Some(j) => gone.push(j),
+                None => {
+                    let message = format!("nothing named `{name}` was observed or assumed before");
+                    self.error(message, e.span, "cannot be forgotten")
+                        .hint_also("name an observation with `as` to be able to forget it");
+                }
+            }
+        }
+        gone
+    }
+
+    /// Makes the block of a named function, so that it can be called.
+    fn declare(&mut self, f: &FnDecl) {
+        let block = self.function_block(Arc::clone(&f.name.node), &f.lambda);
+        self.bind(&f.name, Meaning::Function(block), Type::Function);
+        self.pending.push(Pending { module: self.module, block, decl: f.clone() });
+        if self.modules[self.module].prefix.is_none() {
+            let closure = self.code.constant(Value::Closure(Closure { block, frame: 0 }));
+            self.code.globals.insert(Arc::clone(&f.name.node), closure);
+        }
+    }
+
+    /// An empty function block.
+    pub fn function_block(&mut self, name: Arc<str>, lambda: &Lambda) -> u32 {
+        let params: Arc<[Arc<str>]> = lambda.params.iter().map(|p| Arc::clone(&p.name.node)).collect();
+        let required = lambda.params.iter().position(|p| p.default.is_some()).unwrap_or(lambda.params.len());
+        if let Some(p) = lambda.params[required..].iter().find(|p| p.default.is_none()) {
+            let message = format!("the parameter `{}` needs a default", p.name.node);
+            self.error(message, p.name.span, "comes after one that has a default");
+        }
+        self.new_block(BlockKind::Function { name, params, required })
+    }
+
+    /// Fills a function's block.
+    pub fn function_body(&mut self, block: u32, lambda: &Lambda) {
+        self.scopes.push(Scope::new(block, ScopeKind::Function));
+        self.bodies.push(Body::default());
+        for (i, p) in lambda.params.iter().enumerate() {
+            let slot = self.push(Op::Param { index: i as u16, default: None }, p.name.span);
+            let ty = match &p.ty {
+                Some(t) => declared(&t.node).unwrap_or(Type::Any),
+                None => Type::Any,
+            };
+            let here = crate::lang::code::Operand::Local(slot);
+            self.bind(&p.name, Meaning::Value(here), ty);
+        }
+        for (i, p) in lambda.params.iter().enumerate() {
+            if let Some(e) = &p.default {
+                let value = self.expr(e).at;
+                self.code.blocks[block as usize].ops[i] = Op::Param { index: i as u16, default: Some(value) };
+            }
+        }
+        let result = self.body_of(&lambda.body);
+        self.code.blocks[block as usize].result = result.map(|t| t.at);
+        self.bodies.pop();
+        self.scopes.pop();
+    }
+
+    /// The bodies of all named functions.
+    pub fn function_bodies(&mut self) {
+        for p in std::mem::take(&mut self.pending) {
+            let outer = std::mem::replace(&mut self.module, p.module);
+            self.function_body(p.block, &p.decl.lambda);
+            self.module = outer;
+        }
+    }
+
+    fn param(&mut self, d: &Declaration) {
+        let name = self.global_name(&d.name);
+        let ty = match &d.ty {
+            Some(t) => declared(&t.node).unwrap_or_else(|| {
+                let e = self.error(format!("there is no parameter type `{}`", t.node), t.span, "unknown type");
+                e.hint_also("types are number, int, bool, string and array");
+                Type::Any
+            }),
+            None => d.default.as_ref().map_or(Type::Any, literal_type),
+        };
+        let set = self.inputs.sets.iter().rev().find(|(n, _)| **n == *name).map(|(_, v)| v.clone());
+        let value = match (set, &d.default) {
+            (Some(text), _) => {
+                self.used_sets.push(name.to_string());
+                self.set_value(&name, &text, ty)
+            }
+            (None, Some(e)) => {
+                let value = self.expr(e);
+                self.check_type(value, ty, e.span, &format!("the default of `{}`", d.name.node));
+                value
+            }
+            (None, None) => {
+                if self.inputs.needs_data {
+                    let e = self.error(format!("the parameter `{name}` has no value"), d.name.span, "no default");
+                    e.hint_also(format!("give it on the command line: --set {name}=…"));
+                }
+                self.nothing()
+            }
+        };
+        self.bind_value(&d.name, Typed { at: value.at, ty: if ty == Type::Any { value.ty } else { ty } });
+    }
+
+    /// The value of `--set name=text`.
+    fn set_value(&mut self, name: &str, text: &str, ty: Type) -> Typed {
+        let file = self.map.add(&format!("--set {name}"), text);
+        if ty == Type::Str && !text.starts_with('"') {
+            return self.constant(Value::str(text));
+        }
+        match parse_expr(text, file) {
+            Ok(e) => {
+                let value = self.expr(&e);
+                self.check_type(value, ty, e.span, &format!("`{name}`"));
+                if ty == Type::Int
+                    && let crate::lang::code::Operand::Const(i) = value.at
+                    && let Value::Num(x) = self.code.const_value(i)
+                    && *x != libm::trunc(*x)
+                {
+                    self.error(format!("`{name}` must be a whole number"), e.span, "not whole");
+                }
+                value
+            }
+            Err(errors) => {
+                self.errors.extend(errors.into_iter().map(IntoDiagnostic::into_diagnostic));
+                self.nothing()
+            }
+        }
+    }
+
+    pub fn check_type(&mut self, value: Typed, wanted: Type, span: crate::syntax::span::Span, what: &str) {
+        if !accepts(wanted, value.ty) {
+            let message = format!("{what} must be {}, got {}", shown(wanted), shown(value.ty));
+            self.error(message, span, format!("this is {}", shown(value.ty)));
+        }
+    }
+
+    fn data(&mut self, d: &Declaration, folder: &str) {
+        let name = self.global_name(&d.name);
+        if let Some(t) = &d.ty
+            && !data::kinds().any(|k| k == &*t.node)
+        {
+            let near = nearest(&t.node, data::kinds()).map(str::to_owned);
+            let e = self.error(format!("there is no data of type `{}`", t.node), t.span, "unknown type");
+            match near {
+                Some(n) => e.hint_also(format!("did you mean `{n}`?")),
+                None => e.hint_also(format!("types are {}", data::kinds().collect::<Vec<_>>().join(", "))),
+            }
+        }
+        let value = match (self.inputs.data.get(&*name).cloned(), &d.default) {
+            (Some(v), _) => {
+                self.used_data.push(name.to_string());
+                self.constant(v)
+            }
+            (None, Some(e)) => self.data_default(e, folder),
+            (None, None) => {
+                if self.inputs.needs_data {
+                    let e = self.error(format!("`{name}` is not given"), d.name.span, "needs a file");
+                    e.hint_also(format!("give it on the command line: --observe {name}=FILE"));
+                }
+                self.nothing()
+            }
+        };
+        self.bind_value(&d.name, value);
+    }
+
+    /// `csv("file")` and the like, or any expression.
+    fn data_default(&mut self, e: &Expr, folder: &str) -> Typed {
+        if let ExprKind::Call { callee, args } = &e.kind
+            && let ExprKind::Var(kind) = &callee.kind
+            && data::kinds().any(|k| k == &**kind)
+        {
+            let [arg] = &args[..] else {
+                self.error(format!("{kind} takes one path"), e.span, "expected one string");
+                return self.nothing();
+            };
+            let ExprKind::Str(path) = &arg.value.kind else {
+                self.error(format!("{kind} takes a path in quotes"), arg.value.span, "not a string")
+                    .hint_also("what a run reads must be known before it starts");
+                return self.nothing();
+            };
+            return match (self.inputs.read)(kind, path, folder) {
+                Ok(v) => self.constant(v),
+                Err(f) => {
+                    let d = self.error(f.message, arg.value.span, "cannot be read");
+                    d.hints.extend(f.hint);
+                    self.nothing()
+                }
+            };
+        }
+        self.expr(e)
+    }
+
+    /// `--set` and `--observe` names that no file declares.
+    pub fn unused_inputs(&mut self) {
+        let interface = super::inspect(self.loaded);
+        let params: Vec<&str> = interface.params.iter().map(|p| p.name.as_str()).collect();
+        let items: Vec<&str> = interface.data.iter().map(|d| d.name.as_str()).collect();
+        let mut unknown = Vec::new();
+        for (name, _) in self.inputs.sets {
+            if !self.used_sets.contains(name) {
+                unknown.push(("--set", "parameter", name.clone(), params.clone()));
+            }
+        }
+        for name in self.inputs.data.keys() {
+            if !self.used_data.contains(name) {
+                unknown.push(("--observe", "data item", name.clone(), items.clone()));
+            }
+        }
+        for (option, what, name, known) in unknown {
+            let d = crate::diag::Diagnostic::new(
+                crate::diag::Severity::Error,
+                format!("{option} {name}: the program has no {what} of this name"),
+            );
+            self.errors.push(match (nearest(&name, known.iter().copied()), known.is_empty()) {
+                (Some(n), _) => d.hint(format!("did you mean `{n}`?")),
+                (None, true) => d.hint(format!("it has no {what}s at all")),
+                (None, false) => d.hint(format!("it has {}", known.join(", "))),
+            });
+        }
+    }
+}
+
+/// The type of a literal; anything where it is not one.
+fn literal_type(e: &Expr) -> Type {
+    match &e.kind {
+        ExprKind::Num(_) => Type::Num,
+        ExprKind::Unary { expr, .. } => literal_type(expr),
+        ExprKind::Bool(_) => Type::Bool,
+        ExprKind::Str(_) => Type::Str,
+        ExprKind::Array(_) => Type::Array,
+        _ => Type::Any,
+    }
+}

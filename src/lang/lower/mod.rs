@@ -1,0 +1,243 @@
+//! Lowering: from syntax trees to [`Code`], with every name, argument, tag and address checked.
+//!
+//! Blocks nest as the text does; a name becomes a slot of its block. The top level comes first, then the bodies of named
+//! functions, which see every top-level name, then the inference blocks, which see all that came before. Nothing is
+//! evaluated here but the defaults of `param` and `data` given by the host.
+//!
+//! One file a concern: [`scope`] names and sites, [`items`] the top level, [`stmt`] statements, [`draw`] random choices and
+//! containers, [`expr`] expressions, [`call`] calls, [`plan`] inference blocks, [`select`] selections, [`types`] what can be
+//! told of types.
+
+mod call;
+mod draw;
+mod expr;
+mod interface;
+mod items;
+mod plan;
+mod scope;
+mod select;
+mod stmt;
+mod types;
+
+pub use interface::{DataItem, Interface, ParamItem, inspect};
+
+use super::builtins::Table;
+use super::code::{Block, BlockId, BlockKind, Code, Op, Operand, Slot};
+use super::error::Fault;
+use super::load::Loaded;
+use super::value::Value;
+use crate::diag::{Diagnostic, SourceMap};
+use crate::syntax::ast::{Expr, FnDecl, KStmt, KernelDecl, Name};
+use crate::syntax::span::{Span, Spanned};
+use indexmap::IndexMap;
+use rustc_hash::FxHashMap;
+use scope::{Body, Module, Scope};
+use std::sync::Arc;
+
+/// Reads a file of data: its kind (`image`, `csv`, …), its path as written, the folder of the program.
+pub type ReadData<'a> = &'a dyn Fn(&str, &str, &str) -> Result<Value, Fault>;
+
+/// What a program is given from outside.
+pub struct Inputs<'a> {
+    /// The built-ins it sees.
+    pub builtins: Arc<Table>,
+    /// `--set name=value`, the value as text.
+    pub sets: &'a [(String, String)],
+    /// `data` items that are given, by name.
+    pub data: IndexMap<String, Value>,
+    /// How `data d = csv("file")` reads.
+    pub read: ReadData<'a>,
+    /// Whether a `data` item without a value is an error; not when a program is only checked.
+    pub needs_data: bool,
+    /// Values for arguments left out: of a built-in by full name, an argument by name.
+    pub defaults: FxHashMap<(&'static str, &'static str), Value>,
+}
+
+/// An inference block.
+#[derive(Clone, Debug)]
+pub struct Plan {
+    /// Its name, if it has one.
+    pub name: Option<Arc<str>>,
+    /// Its statements.
+    pub body: Arc<[KStmt]>,
+}
+
+/// `report e, … as "file";`
+#[derive(Clone, Debug)]
+pub struct Report {
+    /// What to report.
+    pub exprs: Vec<Expr>,
+    /// The file, if named.
+    pub file: Option<Arc<str>>,
+}
+
+/// `export e to "file";`
+#[derive(Clone, Debug)]
+pub struct Export {
+    /// What to export.
+    pub expr: Expr,
+    /// The file.
+    pub file: Arc<str>,
+}
+
+/// A program ready to run.
+#[derive(Debug)]
+pub struct Compiled {
+    /// The model.
+    pub code: Arc<Code>,
+    /// Its inference blocks, in order.
+    pub plans: Vec<Plan>,
+    /// Its reports.
+    pub reports: Vec<Report>,
+    /// Its exports.
+    pub exports: Vec<Export>,
+    /// Its user kernels: checked; running them comes later.
+    pub kernels: Vec<KernelDecl>,
+}
+
+/// Lowers a loaded program. The text of `--set` values goes to `map` too.
+///
+/// # Errors
+/// Everything that is wrong with it, in the order of the text.
+pub fn compile(loaded: &Loaded, inputs: Inputs, map: &mut SourceMap) -> Result<Compiled, Vec<Diagnostic>> {
+    let mut l = Lowerer {
+        code: Code { builtins: Arc::clone(&inputs.builtins), ..Code::default() },
+        inputs,
+        loaded,
+        map,
+        errors: Vec::new(),
+        modules: vec![Module::default()],
+        module: 0,
+        scopes: Vec::new(),
+        bodies: Vec::new(),
+        pending: Vec::new(),
+        plans: Vec::new(),
+        kernels: IndexMap::new(),
+        reports: Vec::new(),
+        exports: Vec::new(),
+        used_sets: Vec::new(),
+        used_data: Vec::new(),
+        roots: Vec::new(),
+    };
+    l.code.blocks.push(Block::new(BlockKind::Root, None));
+    l.scopes.push(Scope::new(0, scope::ScopeKind::Root));
+    l.bodies.push(Body::default());
+    l.unit(0);
+    l.function_bodies();
+    l.inference();
+    l.unused_inputs();
+    if !l.errors.is_empty() {
+        l.errors.sort_by_key(|d| d.labels.first().map_or((u32::MAX, 0), |l| (l.span.file.0, l.span.start)));
+        l.errors.dedup();
+        return Err(l.errors);
+    }
+    l.code.finish();
+    Ok(Compiled {
+        code: Arc::new(l.code),
+        plans: l.plans,
+        reports: l.reports,
+        exports: l.exports,
+        kernels: l.kernels.into_values().collect(),
+    })
+}
+
+/// A named function whose body waits until all top-level names are known.
+struct Pending {
+    module: usize,
+    block: BlockId,
+    decl: FnDecl,
+}
+
+struct Lowerer<'a> {
+    code: Code,
+    inputs: Inputs<'a>,
+    loaded: &'a Loaded,
+    map: &'a mut SourceMap,
+    errors: Vec<Diagnostic>,
+    modules: Vec<Module>,
+    module: usize,
+    /// The lexical blocks around what is being lowered; the first is the top level.
+    scopes: Vec<Scope>,
+    /// The function bodies around it; the first is the top level.
+    bodies: Vec<Body>,
+    pending: Vec<Pending>,
+    plans: Vec<Plan>,
+    kernels: IndexMap<Arc<str>, KernelDecl>,
+    reports: Vec<Report>,
+    exports: Vec<Export>,
+    used_sets: Vec<String>,
+    used_data: Vec<String>,
+    /// First segments of addresses: what a selection may begin with.
+    roots: Vec<Arc<str>>,
+}
+
+/// An operand and what is known of its type.
+#[derive(Clone, Copy, Debug)]
+struct Typed {
+    at: Operand,
+    ty: super::builtins::Type,
+}
+
+impl Lowerer<'_> {
+    fn error(&mut self, message: impl Into<String>, span: Span, label: impl Into<String>) -> &mut Diagnostic {
+        self.errors.push(Diagnostic::error(message, span, label));
+        let last = self.errors.len() - 1;
+        &mut self.errors[last]
+    }
+
+    /// The block being filled.
+    fn block(&self) -> BlockId {
+        self.scopes.last().map_or(0, |s| s.block)
+    }
+
+    /// Adds an operation to the block being filled.
+    fn push(&mut self, op: Op, span: Span) -> Slot {
+        let block = self.block();
+        self.code.blocks[block as usize].push(op, span)
+    }
+
+    fn new_block(&mut self, kind: BlockKind) -> BlockId {
+        let parent = Some(self.block());
+        self.code.blocks.push(Block::new(kind, parent));
+        self.code.blocks.len() as BlockId - 1
+    }
+
+    fn constant(&mut self, v: Value) -> Typed {
+        let ty = types::of_value(&v);
+        Typed { at: self.code.constant(v), ty }
+    }
+
+    /// What stands for something that could not be lowered: an error was reported.
+    fn nothing(&mut self) -> Typed {
+        Typed { at: self.code.constant(Value::Unit), ty: super::builtins::Type::Any }
+    }
+
+    /// The name under which a name of the current module appears in reports.
+    fn global_name(&self, name: &Name) -> Arc<str> {
+        match &self.modules[self.module].prefix {
+            Some(p) => Arc::from(format!("{p}/{}", name.node)),
+            None => Arc::clone(&name.node),
+        }
+    }
+}
+
+/// A hint added in place.
+trait AddHint {
+    fn hint_also(&mut self, hint: impl Into<String>);
+    fn point_at(&mut self, span: Span, text: &str);
+}
+
+impl AddHint for Diagnostic {
+    fn hint_also(&mut self, hint: impl Into<String>) {
+        self.hints.push(hint.into());
+    }
+
+    fn point_at(&mut self, span: Span, text: &str) {
+        self.labels.push(crate::diag::Label { span, text: text.into(), primary: false });
+    }
+}
+
+/// The text of a spanned string.
+fn text(s: &Spanned<Arc<str>>) -> Arc<str> {
+    Arc::clone(&s.node)
+}

@@ -1,0 +1,227 @@
+//! Names, lexical blocks and sites: which slot a name means, and what a place adds to addresses.
+
+use super::{AddHint, Lowerer, Typed};
+use crate::lang::builtins::Type;
+use crate::lang::code::{BlockId, Operand, Site, SiteSegment, SiteTag, Slot};
+use crate::syntax::ast::Name;
+use crate::syntax::span::Span;
+use indexmap::IndexMap;
+use rustc_hash::FxHashMap;
+use std::sync::Arc;
+
+/// What a name stands for.
+#[derive(Clone, Copy, Debug, PartialEq)]
+pub(super) enum Meaning {
+    /// A constant, or a slot of the block the name is bound in.
+    Value(Operand),
+    /// A named function.
+    Function(BlockId),
+    /// A keyed container: its slot.
+    Container(Slot),
+}
+
+/// A bound name.
+#[derive(Clone, Copy, Debug)]
+pub(super) struct Binding {
+    pub meaning: Meaning,
+    pub ty: Type,
+    pub span: Span,
+}
+
+/// The kinds of lexical blocks.
+#[derive(Clone, Debug, PartialEq)]
+pub(super) enum ScopeKind {
+    Root,
+    Function,
+    Branch,
+    /// A pass of the `for` at a slot of the block around it.
+    Loop {
+        var: Arc<str>,
+        at: Slot,
+    },
+}
+
+/// A lexical block.
+#[derive(Debug)]
+pub(super) struct Scope {
+    pub block: BlockId,
+    pub kind: ScopeKind,
+    pub names: IndexMap<Arc<str>, Binding>,
+    /// Elements of containers drawn here: container, keys as written, slot.
+    pub drawn: Vec<(Arc<str>, String, Slot)>,
+}
+
+impl Scope {
+    pub fn new(block: BlockId, kind: ScopeKind) -> Self {
+        Scope { block, kind, names: IndexMap::new(), drawn: Vec::new() }
+    }
+}
+
+/// What is counted and remembered for one function body: addresses are relative to it.
+#[derive(Debug, Default)]
+pub(super) struct Body {
+    /// The bindings around the present expression, outermost first.
+    pub prefix: Vec<Arc<str>>,
+    /// How often a name occurred under a prefix.
+    counts: FxHashMap<(Vec<Arc<str>>, Arc<str>), u32>,
+    /// Tags of the `assume` around, by index of their name.
+    pub tags: Vec<SiteTag>,
+}
+
+/// The top-level names of a file, or of files that share a namespace.
+#[derive(Debug, Default)]
+pub(super) struct Module {
+    pub names: IndexMap<Arc<str>, Binding>,
+    pub namespaces: FxHashMap<Arc<str>, Namespace>,
+    /// What its names are called from outside.
+    pub prefix: Option<Arc<str>>,
+    /// The module of the table of built-ins whose names it sees.
+    pub native: Option<Arc<str>>,
+}
+
+/// What `ns` in `ns.name` stands for.
+#[derive(Clone, Debug)]
+pub(super) struct Namespace {
+    pub module: usize,
+    pub span: Span,
+}
+
+impl Lowerer<'_> {
+    /// A name's meaning, and how many blocks out it is bound.
+    pub fn lookup(&self, name: &str) -> Option<(Binding, u16)> {
+        for (up, scope) in self.scopes.iter().rev().enumerate() {
+            let names = if scope.kind == ScopeKind::Root { &self.modules[self.module].names } else { &scope.names };
+            if let Some(b) = names.get(name) {
+                return Some((*b, up as u16));
+            }
+        }
+        None
+    }
+
+    /// An operand seen from `up` blocks further in.
+    pub fn reach(o: Operand, up: u16) -> Operand {
+        match o {
+            Operand::Local(slot) if up > 0 => Operand::Outer { up, slot },
+            o => o,
+        }
+    }
+
+    /// Every name visible here, for hints.
+    pub fn visible(&self) -> Vec<Arc<str>> {
+        let mut names: Vec<Arc<str>> = self.scopes.iter().flat_map(|s| s.names.keys().cloned()).collect();
+        let module = &self.modules[self.module];
+        names.extend(module.names.keys().cloned());
+        names.extend(module.namespaces.keys().cloned());
+        names
+    }
+
+    /// Binds a name in the innermost block.
+    pub fn bind(&mut self, name: &Name, meaning: Meaning, ty: Type) {
+        let binding = Binding { meaning, ty, span: name.span };
+        let at_root = self.scopes.last().is_none_or(|s| s.kind == ScopeKind::Root);
+        let names = if at_root {
+            &mut self.modules[self.module].names
+        } else {
+            match self.scopes.last_mut() {
+                Some(s) => &mut s.names,
+                None => return,
+            }
+        };
+        if let Some(old) = names.insert(Arc::clone(&name.node), binding) {
+            let e = self.error(format!("`{}` is bound twice", name.node), name.span, "bound again here");
+            e.point_at(old.span, "first bound here");
+            e.hint_also("give one of them another name");
+        }
+    }
+
+    /// Binds a value at the innermost block; at the top level the inference blocks see it too.
+    pub fn bind_value(&mut self, name: &Name, value: Typed) {
+        self.bind(name, Meaning::Value(value.at), value.ty);
+        if self.scopes.len() == 1 {
+            let global = self.global_name(name);
+            self.code.globals.insert(global, value.at);
+        }
+    }
+
+    fn body(&mut self) -> &mut Body {
+        if self.bodies.is_empty() {
+            self.bodies.push(Body::default());
+        }
+        let last = self.bodies.len() - 1;
+        &mut self.bodies[last]
+    }
+
+    /// Lowers something below a binding's name.
+    pub fn below<T>(&mut self, name: &Arc<str>, f: impl FnOnce(&mut Self) -> T) -> T {
+        self.note_root(name);
+        self.body().prefix.push(Arc::clone(name));
+        let result = f(self);
+        self.body().prefix.pop();
+        result
+    }
+
+    /// Remembers a name that addresses may begin with.
+    fn note_root(&mut self, name: &Arc<str>) {
+        if self.bodies.len() == 1 && self.body().prefix.is_empty() && !self.roots.contains(name) {
+            self.roots.push(Arc::clone(name));
+        }
+    }
+
+    /// A site below the present bindings.
+    pub fn site(&mut self, name: &Arc<str>, own_tags: Vec<SiteTag>, carried: u32) -> u32 {
+        let module = self.modules[self.module].prefix.clone();
+        if self.bodies.len() == 1
+            && let Some(m) = &module
+        {
+            if !self.roots.contains(m) {
+                self.roots.push(Arc::clone(m));
+            }
+        } else {
+            self.note_root(name);
+        }
+        let in_function = self.bodies.len() > 1;
+        let body = self.body();
+        let count = body.counts.entry((body.prefix.clone(), Arc::clone(name))).or_insert(0);
+        *count += 1;
+        let occurrence = *count;
+        let outer = module.into_iter().filter(|_| !in_function);
+        let mut segments: Vec<SiteSegment> =
+            outer.chain(body.prefix.iter().cloned()).map(|s| SiteSegment::new(s, 1)).collect();
+        segments.push(SiteSegment::new(Arc::clone(name), occurrence));
+        let tags = body.tags.iter().cloned().chain(own_tags).collect();
+        self.code.sites.push(Site { segments: segments.into(), carried, tags });
+        self.code.sites.len() as u32 - 1
+    }
+
+    /// The index of a tag's name.
+    pub fn tag_index(&mut self, name: &Arc<str>) -> u32 {
+        if let Some(i) = self.code.tags.iter().position(|t| t == name) {
+            return i as u32;
+        }
+        self.code.tags.push(Arc::clone(name));
+        self.code.tags.len() as u32 - 1
+    }
+
+    /// Tags added by the `assume` around what `f` lowers.
+    pub fn with_tags<T>(&mut self, tags: Vec<SiteTag>, f: impl FnOnce(&mut Self) -> T) -> T {
+        let depth = self.body().tags.len();
+        self.body().tags.extend(tags);
+        let result = f(self);
+        self.body().tags.truncate(depth);
+        result
+    }
+
+    /// The loops of the present function around the innermost block, outermost first: index into scopes.
+    pub fn loops_here(&self) -> Vec<usize> {
+        let mut loops = Vec::new();
+        for (i, s) in self.scopes.iter().enumerate().rev() {
+            match s.kind {
+                ScopeKind::Loop { .. } => loops.push(i),
+                ScopeKind::Branch => {}
+                _ => break,
+            }
+        }
+        loops.reverse();
+        loops
+    }
+}

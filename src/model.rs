@@ -1,0 +1,383 @@
+//! Embedding: a program compiled with its data, run to a posterior, in a few calls.
+//!
+//! ```
+//! use pcadlang::{Model, RunOptions};
+//! let model = Model::from_text("assume x ~ normal(0, 1); observe normal(x, 0.5) = 2;")?;
+//! let posterior = model.run(&RunOptions { steps: Some(2000), ..RunOptions::default() }, 2, 2)?;
+//! let x = &posterior.quantity("x").unwrap().summary;
+//! assert!((x.mean - 1.6).abs() < 0.2);
+//! # Ok::<(), pcadlang::Error>(())
+//! ```
+
+use crate::diag::{Diagnostic, IntoDiagnostic, Severity, SourceMap, render};
+use crate::infer::draws::Sink;
+use crate::infer::{ChainError, ChainResult, Progress, RunOptions, default_plan, run_chains};
+use crate::lang::builtins::{Table, data};
+use crate::lang::code::Code;
+use crate::lang::error::{Fault, FaultKind, RunError};
+use crate::lang::load::{Disk, Loaded, Loader, Nowhere, load, load_text, read, reason};
+use crate::lang::lower::{Compiled, Export, Inputs, Interface, Report, compile, inspect};
+use crate::lang::value::Value;
+use crate::report::{ChainDraws, Memory, Quantity, quantities, text_hash};
+use crate::rng::{Purpose, StreamKey};
+use crate::syntax::ast::KStmt;
+use crate::syntax::parse;
+use crate::trace::{Draws, Limits, Trace};
+use indexmap::IndexMap;
+use rustc_hash::FxHashMap;
+use std::fmt;
+use std::sync::Arc;
+
+/// What is wrong with a program, its data, or a run of it: messages with their places.
+#[derive(Clone, Debug)]
+pub struct Error {
+    /// The messages.
+    pub diagnostics: Vec<Diagnostic>,
+    /// The texts they point into.
+    pub sources: SourceMap,
+}
+
+impl fmt::Display for Error {
+    fn fmt(&self, f: &mut fmt::Formatter<'_>) -> fmt::Result {
+        f.write_str(&render(&self.sources, &self.diagnostics, false))
+    }
+}
+
+impl std::error::Error for Error {}
+
+impl IntoDiagnostic for RunError {
+    fn into_diagnostic(self) -> Diagnostic {
+        let mut d = Diagnostic::error(self.message, self.span, "");
+        if !self.address.segments.is_empty() {
+            d = d.note(format!("while running {}", self.address));
+        }
+        let calls: Vec<&str> = self.calls.iter().map(|(f, _)| &**f).collect();
+        match calls.len() {
+            0 => {}
+            1..=8 => d = d.note(format!("called through {}", calls.join(" -> "))),
+            n => {
+                let (first, last) = (calls[..4].join(" -> "), calls[n - 3..].join(" -> "));
+                d = d.note(format!("called through {first} -> … {} more … -> {last}", n - 7));
+            }
+        }
+        d.hints.extend(self.hint);
+        d
+    }
+}
+
+/// A program on its way to a [`Model`]: loaded, its inputs not yet given.
+pub struct Program {
+    loaded: Loaded,
+    sources: SourceMap,
+    loader: Box<dyn Loader>,
+    text: String,
+    sets: Vec<(String, String)>,
+    data: IndexMap<String, Value>,
+    defaults: FxHashMap<(&'static str, &'static str), Value>,
+    needs_data: bool,
+    builtins: Arc<Table>,
+}
+
+impl Program {
+    /// Loads a program by path; the shipped programs are found in any folder.
+    ///
+    /// # Errors
+    /// If a file is missing, or does not parse.
+    pub fn open(path: &str) -> Result<Program, Error> {
+        let mut sources = SourceMap::new();
+        match load(path, &Disk, &mut sources) {
+            Ok(loaded) => Ok(Program::new(loaded, sources, Box::new(Disk))),
+            Err(diagnostics) => Err(Error { diagnostics, sources }),
+        }
+    }
+
+    /// A program from its text; it can include only what is built in.
+    ///
+    /// # Errors
+    /// If it does not parse.
+    pub fn parse(text: &str) -> Result<Program, Error> {
+        let mut sources = SourceMap::new();
+        match load_text("<program>", text, &Nowhere, &mut sources) {
+            Ok(loaded) => Ok(Program::new(loaded, sources, Box::new(Nowhere))),
+            Err(diagnostics) => Err(Error { diagnostics, sources }),
+        }
+    }
+
+    fn new(loaded: Loaded, sources: SourceMap, loader: Box<dyn Loader>) -> Program {
+        let text =
+            loaded.units.first().and_then(|u| sources.get(u.file)).map_or(String::new(), |f| f.text().to_string());
+        Program {
+            loaded,
+            sources,
+            loader,
+            text,
+            sets: Vec::new(),
+            data: IndexMap::new(),
+            defaults: FxHashMap::default(),
+            needs_data: true,
+            builtins: Arc::new(Table::default()),
+        }
+    }
+
+    /// Its parameters and data.
+    pub fn interface(&self) -> Interface {
+        inspect(&self.loaded)
+    }
+
+    /// The text of its main file.
+    pub fn text(&self) -> &str {
+        &self.text
+    }
+
+    /// Names of built-in files that stood in for files of the user's own.
+    pub fn embedded(&self) -> &[String] {
+        &self.loaded.embedded
+    }
+
+    /// Sets a `param`, its value written as in a program.
+    #[must_use]
+    pub fn set(mut self, name: &str, value: &str) -> Program {
+        self.sets.push((name.into(), value.into()));
+        self
+    }
+
+    /// Gives a `data` item.
+    #[must_use]
+    pub fn observe(mut self, name: &str, value: Value) -> Program {
+        self.data.insert(name.into(), value);
+        self
+    }
+
+    /// Reads a file for a `data` item as its declared kind.
+    ///
+    /// # Errors
+    /// If the program has no such item, or the file cannot be read as that.
+    pub fn observe_file(self, name: &str, path: &str) -> Result<Program, Error> {
+        let kind = self.interface().data.iter().find(|d| d.name == name).and_then(|d| d.ty.clone());
+        let kind = kind.unwrap_or_else(|| "image".into());
+        let loaded = match self.loader.read(path) {
+            Ok(bytes) => data::load(&kind, path, &bytes),
+            Err(e) => Err(Fault::new(FaultKind::Other, format!("cannot read {path}: {}", reason(&e)))),
+        };
+        match loaded {
+            Ok(value) => Ok(self.observe(name, value)),
+            Err(f) => Err(plain_error(f, &self.sources)),
+        }
+    }
+
+    /// The value of an argument wherever a program leaves it out: of a built-in by full name, an argument by name.
+    #[must_use]
+    pub fn default_argument(mut self, function: &'static str, argument: &'static str, value: Value) -> Program {
+        self.defaults.insert((function, argument), value);
+        self
+    }
+
+    /// Compiles also when `data` items are not given, to check the rest.
+    #[must_use]
+    pub fn without_data(mut self) -> Program {
+        self.needs_data = false;
+        self
+    }
+
+    /// Checks and lowers the program.
+    ///
+    /// # Errors
+    /// Everything that is wrong with it.
+    pub fn compile(mut self) -> Result<Model, Error> {
+        let loader = &*self.loader;
+        let read_data = |kind: &str, path: &str, folder: &str| {
+            let beside = format!("{folder}{path}");
+            match read(loader, &beside) {
+                Ok((bytes, _)) => data::load(kind, &beside, &bytes),
+                Err(e) => Err(Fault::new(FaultKind::Other, format!("cannot read {beside}: {}", reason(&e)))),
+            }
+        };
+        let inputs = Inputs {
+            builtins: Arc::clone(&self.builtins),
+            sets: &self.sets,
+            data: self.data,
+            read: &read_data,
+            needs_data: self.needs_data,
+            defaults: self.defaults,
+        };
+        match compile(&self.loaded, inputs, &mut self.sources) {
+            Ok(compiled) => {
+                let hash = hash_of(&self.loaded, &self.sources, &self.sets);
+                Ok(Model { compiled, sources: self.sources, text: self.text, hash })
+            }
+            Err(diagnostics) => Err(Error { diagnostics, sources: self.sources }),
+        }
+    }
+}
+
+/// A hash of all a program's text and settings: a saved trace belongs to it.
+fn hash_of(loaded: &Loaded, sources: &SourceMap, sets: &[(String, String)]) -> String {
+    let mut all = String::new();
+    for u in &loaded.units {
+        if let Some(f) = sources.get(u.file) {
+            all.push_str(f.text());
+            all.push('\0');
+        }
+    }
+    for (k, v) in sets {
+        all.push_str(&format!("{k}={v}\0"));
+    }
+    text_hash(&all)
+}
+
+fn plain_error(f: Fault, sources: &SourceMap) -> Error {
+    let mut d = Diagnostic::new(Severity::Error, f.message);
+    d.hints.extend(f.hint);
+    Error { diagnostics: vec![d], sources: sources.clone() }
+}
+
+/// A compiled program with its data.
+#[derive(Debug)]
+pub struct Model {
+    compiled: Compiled,
+    sources: SourceMap,
+    text: String,
+    hash: String,
+}
+
+impl Model {
+    /// Compiles a program given as text, with its defaults.
+    ///
+    /// # Errors
+    /// Everything that is wrong with it.
+    pub fn from_text(text: &str) -> Result<Model, Error> {
+        Program::parse(text)?.compile()
+    }
+
+    /// The lowered program, for work on [traces](crate::trace).
+    pub fn code(&self) -> &Arc<Code> {
+        &self.compiled.code
+    }
+
+    /// A hash of the program's text and settings.
+    pub fn hash(&self) -> &str {
+        &self.hash
+    }
+
+    /// The text of the main file.
+    pub fn text(&self) -> &str {
+        &self.text
+    }
+
+    /// The texts that errors point into.
+    pub fn sources(&self) -> &SourceMap {
+        &self.sources
+    }
+
+    /// The program's exports.
+    pub fn exports(&self) -> &[Export] {
+        &self.compiled.exports
+    }
+
+    /// The program's reports.
+    pub fn reports(&self) -> &[Report] {
+        &self.compiled.reports
+    }
+
+    /// One draw from the prior, conditioned on nothing: observations are scored, not simulated.
+    ///
+    /// # Errors
+    /// What the program does wrong.
+    pub fn simulate(&self, seed: u64, index: u64) -> Result<Trace, Error> {
+        let draws = Draws { key: StreamKey::new(seed, 0, Purpose::START), step: index, lane: 0 };
+        Trace::simulate(Arc::clone(self.code()), draws, Limits::default()).map_err(|e| self.run_error(*e))
+    }
+
+    /// Turns a failure while running into messages.
+    pub fn run_error(&self, e: RunError) -> Error {
+        Error { diagnostics: vec![e.into_diagnostic()], sources: self.sources.clone() }
+    }
+
+    /// Turns the failure of a chain into messages.
+    pub fn chain_error(&self, e: ChainError) -> Error {
+        use crate::infer::StartError;
+        let plain = |message: String| Diagnostic::new(Severity::Error, message);
+        let d = match e {
+            ChainError::Run(e) | ChainError::Start(StartError::Run(e)) => e.into_diagnostic(),
+            ChainError::Start(StartError::Impossible(why)) => {
+                plain(format!("no chain can start: {why}")).hint("widen the prior, or the spread of the observation")
+            }
+            ChainError::Sink(e) => plain(format!("draws cannot be written: {e}")),
+        };
+        Error { diagnostics: vec![d], sources: self.sources.clone() }
+    }
+
+    /// The plan of inference: the program's first `infer` block, or the default plan; the second part is the text of the
+    /// default plan where that is used.
+    ///
+    /// # Errors
+    /// If the program cannot be run once, to see what choices it makes.
+    pub fn plan(&self) -> Result<(Arc<[KStmt]>, Option<String>), Error> {
+        if let Some(p) = self.compiled.plans.first() {
+            return Ok((Arc::clone(&p.body), None));
+        }
+        let mut trace = self.simulate(0, 0)?;
+        let text = default_plan(&mut trace);
+        let mut sources = self.sources.clone();
+        let file = sources.add("<default plan>", &text);
+        let (program, _) = parse(&text, file);
+        let body = program.items.into_iter().find_map(|i| match i.kind {
+            crate::syntax::ast::ItemKind::Infer { body, .. } => Some(body),
+            _ => None,
+        });
+        Ok((body.unwrap_or_default().into(), Some(text)))
+    }
+
+    /// Runs chains and keeps their draws in memory. Draws depend on the seed, never on the number of threads.
+    ///
+    /// # Errors
+    /// If a chain cannot start or the program fails.
+    pub fn run(&self, options: &RunOptions, chains: usize, threads: usize) -> Result<Posterior, Error> {
+        let memories: Vec<Memory> = (0..chains.max(1)).map(|_| Memory::default()).collect();
+        let sinks = memories.iter().map(|m| Box::new(m.clone()) as Box<dyn Sink>).collect();
+        let results = self.run_into(options, threads, &Progress::default(), sinks)?;
+        let results = results.into_iter().collect::<Result<Vec<_>, _>>().map_err(|e| self.chain_error(e))?;
+        Ok(Posterior { draws: memories.iter().map(Memory::draws).collect(), chains: results })
+    }
+
+    /// Runs one chain a sink. A chain that fails does not stop the others.
+    ///
+    /// # Errors
+    /// As [`Model::plan`].
+    pub fn run_into(
+        &self,
+        options: &RunOptions,
+        threads: usize,
+        progress: &Progress,
+        sinks: Vec<Box<dyn Sink>>,
+    ) -> Result<Vec<Result<ChainResult, ChainError>>, Error> {
+        let (plan, _) = self.plan()?;
+        Ok(run_chains(self.code(), &plan, options, threads, progress, sinks))
+    }
+}
+
+/// Draws from a posterior, and the chains that made them.
+#[derive(Debug)]
+pub struct Posterior {
+    /// The draws of each chain.
+    pub draws: Vec<ChainDraws>,
+    /// The last state of each chain, its kernels, its counts.
+    pub chains: Vec<ChainResult>,
+}
+
+impl Posterior {
+    /// Every scalar quantity with its summary; elements of vectors are `name[i]`.
+    pub fn quantities(&self) -> Vec<Quantity> {
+        quantities(&self.draws)
+    }
+
+    /// One of them.
+    pub fn quantity(&self, name: &str) -> Option<Quantity> {
+        self.quantities().into_iter().find(|q| q.name == name)
+    }
+
+    /// The draws of every scalar quantity, all chains one after the other.
+    pub fn scalars(&self) -> Vec<(String, Vec<f64>)> {
+        self.quantities().into_iter().map(|q| (q.name, q.chains.concat())).collect()
+    }
+}
