@@ -1,1 +1,23 @@
-//! (to be written)
+//! Drawing on the processor: cameras, depth frames, contours, and simple shaded pictures.
+//!
+//! Not here: meshes and transforms (`geom`), comparing pictures (`vision`). Nothing in this module draws random
+//! numbers, and the same input gives the same output on every machine.
+
+mod camera;
+mod camera_json;
+mod contours;
+mod frame;
+mod project;
+mod raster;
+mod shade;
+mod view;
+mod visibility;
+
+#[cfg(test)]
+mod testing;
+
+pub use camera::{Camera, CameraError, Projection};
+pub use contours::Contours;
+pub use frame::{Channels, Frame};
+pub use shade::shade;
+pub use view::View;

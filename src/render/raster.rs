@@ -1,0 +1,271 @@
+//! The rasteriser: triangles in image coordinates into runs of pixels.
+//!
+//! A pixel belongs to a triangle when its centre is inside; centres on an edge go to the triangle to the right of or
+//! below it (the top-left rule). Every edge is walked from its upper to its lower end whichever triangle asks, so
+//! triangles that share an edge neither overlap nor leave gaps, at any size. It does no shading and keeps no state.
+
+use super::project::{Lens, Placement, Point, project};
+use super::{Camera, project::DepthRange};
+use crate::geom::Solid;
+use glam::DVec3;
+
+/// A run of pixels in one row; nearness changes linearly from pixel to pixel.
+pub(super) struct Run {
+    pub row: usize,
+    pub from: usize,
+    pub to: usize,
+    /// Nearness at the first pixel's centre.
+    pub nearness: f32,
+    /// Change of nearness per pixel.
+    pub step: f32,
+}
+
+/// One triangle, ready to be drawn.
+pub(super) struct Triangle {
+    pub points: [Point; 3],
+    /// Least and greatest nearness of the corners.
+    pub limits: [f32; 2],
+    /// Twice the area in pixels; negative when counter-clockwise as seen in the image.
+    pub area: f64,
+}
+
+impl Triangle {
+    /// `None` when no pixel centre of a `width` x `height` image can be inside.
+    #[inline]
+    pub fn new(points: [Point; 3], width: u32, height: u32) -> Option<Triangle> {
+        let [a, b, c] = points;
+        let first = |lo: f64| (lo - 0.5).ceil().max(0.0);
+        let past = |hi: f64, side: u32| (hi - 0.5).ceil().min(f64::from(side));
+        if first(a.y.min(b.y).min(c.y)) >= past(a.y.max(b.y).max(c.y), height)
+            || first(a.x.min(b.x).min(c.x)) >= past(a.x.max(b.x).max(c.x), width)
+        {
+            return None;
+        }
+        let area = (b.x - a.x) * (c.y - a.y) - (b.y - a.y) * (c.x - a.x);
+        let lo = a.nearness.min(b.nearness).min(c.nearness) as f32;
+        let hi = a.nearness.max(b.nearness).max(c.nearness) as f32;
+        (area != 0.0 && area.is_finite()).then_some(Triangle { points, limits: [lo, hi], area })
+    }
+
+    /// Calls `draw` for every row's run of pixels.
+    #[inline]
+    pub fn runs(&self, width: u32, height: u32, mut draw: impl FnMut(Run)) {
+        let [a, b, c] = self.points;
+        let inverse = 1.0 / self.area;
+        let (qb, qc) = (b.nearness - a.nearness, c.nearness - a.nearness);
+        let dx = (qb * (c.y - a.y) - qc * (b.y - a.y)) * inverse;
+        let dy = (qc * (b.x - a.x) - qb * (c.x - a.x)) * inverse;
+        let [mut top, mut middle, mut bottom] = [a, b, c];
+        let above = |p: &Point, q: &Point| (p.y, p.x) <= (q.y, q.x);
+        if !above(&top, &middle) {
+            std::mem::swap(&mut top, &mut middle);
+        }
+        if !above(&middle, &bottom) {
+            std::mem::swap(&mut middle, &mut bottom);
+        }
+        if !above(&top, &middle) {
+            std::mem::swap(&mut top, &mut middle);
+        }
+        let slope = |p: &Point, q: &Point| (q.x - p.x) / (q.y - p.y);
+        let row_at = |y: f64| (y - 0.5).ceil().clamp(0.0, f64::from(height)) as usize;
+        let long = slope(&top, &bottom);
+        let limit = f64::from(width);
+        let column = |x: f64| (x - 0.5).ceil().max(0.0).min(limit) as usize;
+        for (upper, lower) in [(&top, &middle), (&middle, &bottom)] {
+            let (first, past) = (row_at(upper.y), row_at(lower.y));
+            if first >= past {
+                continue;
+            }
+            let short = slope(upper, lower);
+            for row in first..past {
+                let y = row as f64 + 0.5;
+                let x1 = column(top.x + (y - top.y) * long);
+                let x2 = column(upper.x + (y - upper.y) * short);
+                let (from, to) = if x1 <= x2 { (x1, x2) } else { (x2, x1) };
+                if from < to {
+                    let nearness = a.nearness + dx * (from as f64 + 0.5 - a.x) + dy * (y - a.y);
+                    draw(Run { row, from, to, nearness: nearness as f32, step: dx as f32 });
+                }
+            }
+        }
+    }
+}
+
+/// What a triangle is, besides its corners in the image.
+pub(super) struct Source<'a> {
+    /// Index of the instance in the solid.
+    pub instance: usize,
+    /// Face of the instance's mesh.
+    pub face: usize,
+    pub placement: &'a Placement,
+    /// Weights of the face's three corners at each corner of the triangle: other than the identity where the near
+    /// plane cut the face.
+    pub weights: [[f64; 3]; 3],
+}
+
+const WHOLE: [[f64; 3]; 3] = [[1.0, 0.0, 0.0], [0.0, 1.0, 0.0], [0.0, 0.0, 1.0]];
+
+/// Calls `draw` for each triangle that may touch the image, cut at the near plane. `points` are those of [`project`].
+pub(super) fn each_triangle(
+    solid: &Solid,
+    camera: &Camera,
+    points: &[Point],
+    mut draw: impl FnMut(&Triangle, &Source<'_>),
+) {
+    let (width, height) = (camera.width, camera.height);
+    let mut base = 0;
+    for (instance, item) in solid.instances().iter().enumerate() {
+        let placement = Placement::new(camera, &item.affine);
+        let count = item.mesh.positions.len();
+        let Some(points) = points.get(base..base + count) else { return };
+        base += count;
+        for (face, &[i, j, k]) in item.mesh.topology.triangles.iter().enumerate() {
+            let (Some(a), Some(b), Some(c)) =
+                (points.get(i as usize), points.get(j as usize), points.get(k as usize))
+            else {
+                continue;
+            };
+            if a.depth >= Camera::NEAR && b.depth >= Camera::NEAR && c.depth >= Camera::NEAR {
+                if let Some(triangle) = Triangle::new([*a, *b, *c], width, height) {
+                    draw(&triangle, &Source { instance, face, placement: &placement, weights: WHOLE });
+                }
+            } else if a.depth >= Camera::NEAR || b.depth >= Camera::NEAR || c.depth >= Camera::NEAR {
+                if a.depth.is_nan() || b.depth.is_nan() || c.depth.is_nan() {
+                    continue;
+                }
+                let corners = [i, j, k].map(|v| placement.point(item.mesh.positions[v as usize].as_dvec3()));
+                let (cut, n) = cut_near(&corners);
+                let lens = Lens::new(camera);
+                let corner = |w: &[f64; 3]| {
+                    let p = corners[0] * w[0] + corners[1] * w[1] + corners[2] * w[2];
+                    lens.point(DVec3::new(p.x, p.y, p.z.min(-Camera::NEAR)))
+                };
+                for m in 2..n {
+                    let weights = [cut[0], cut[m - 1], cut[m]];
+                    if let Some(triangle) = Triangle::new(weights.each_ref().map(corner), width, height) {
+                        draw(&triangle, &Source { instance, face, placement: &placement, weights });
+                    }
+                }
+            }
+        }
+    }
+}
+
+/// The part of a triangle beyond the near plane as a polygon of at most four corners, each as weights.
+fn cut_near(corners: &[DVec3; 3]) -> ([[f64; 3]; 4], usize) {
+    let mut out = [[0.0; 3]; 4];
+    let mut n = 0;
+    let mut push = |w: [f64; 3]| {
+        out[n] = w;
+        n += 1;
+    };
+    let beyond = corners.map(|p| -p.z - Camera::NEAR);
+    for i in 0..3 {
+        let j = (i + 1) % 3;
+        if beyond[i] >= 0.0 {
+            push(WHOLE[i]);
+        }
+        if (beyond[i] >= 0.0) != (beyond[j] >= 0.0) {
+            // From the far end in both of the faces that share the edge: the same point in both.
+            let (far, near) = if beyond[i] >= 0.0 { (i, j) } else { (j, i) };
+            let u = beyond[far] / (beyond[far] - beyond[near]);
+            let mut w = [0.0; 3];
+            w[far] = 1.0 - u;
+            w[near] = u;
+            push(w);
+        }
+    }
+    (out, n)
+}
+
+/// Draws nearness alone into `buffer` (row by row, refilled here) and returns the depth range of the vertices.
+pub(super) fn draw_nearness(
+    solid: &Solid,
+    camera: &Camera,
+    points: &mut Vec<Point>,
+    buffer: &mut Vec<f32>,
+) -> DepthRange {
+    let range = project(solid, camera, points);
+    let width = camera.width as usize;
+    buffer.clear();
+    buffer.resize(camera.pixels(), empty(camera));
+    each_triangle(solid, camera, points, |triangle, _| {
+        let [lo, hi] = triangle.limits;
+        triangle.runs(camera.width, camera.height, |run| {
+            let start = run.row * width;
+            let Some(pixels) = buffer.get_mut(start + run.from..start + run.to) else { return };
+            for (i, pixel) in pixels.iter_mut().enumerate() {
+                let q = (run.nearness + run.step * i as f32).max(lo).min(hi);
+                *pixel = if q > *pixel { q } else { *pixel };
+            }
+        });
+    });
+    range
+}
+
+/// The nearness of a pixel that shows nothing.
+pub(super) fn empty(camera: &Camera) -> f32 {
+    if Lens::new(camera).pinhole { 0.0 } else { f32::NEG_INFINITY }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    fn at(x: f64, y: f64) -> Point {
+        Point { x, y, nearness: 1.0, depth: 1.0 }
+    }
+
+    fn cover(triangles: &[[Point; 3]], side: u32) -> Vec<u32> {
+        let mut count = vec![0; (side * side) as usize];
+        for t in triangles {
+            if let Some(t) = Triangle::new(*t, side, side) {
+                t.runs(side, side, |run| {
+                    for x in run.from..run.to {
+                        count[run.row * side as usize + x] += 1;
+                    }
+                });
+            }
+        }
+        count
+    }
+
+    #[test]
+    fn a_fan_of_triangles_covers_each_pixel_once() {
+        let mut state = 7u64;
+        let mut unit = || {
+            state = state.wrapping_mul(6364136223846793005).wrapping_add(1442695040888963407);
+            (state >> 11) as f64 / (1u64 << 53) as f64
+        };
+        for round in 0..200 {
+            // Corners on quarter pixels every other time: centres lie exactly on edges.
+            let mut place = |scale: f64| {
+                let v = unit() * scale;
+                if round % 2 == 0 { (v * 2.0).round() / 2.0 } else { v }
+            };
+            let middle = at(4.0 + place(8.0), 4.0 + place(8.0));
+            let far = if round % 3 == 0 { 1e6 } else { 0.0 };
+            let square = [at(-far, -far), at(16.0 + far, -far), at(16.0 + far, 16.0 + far), at(-far, 16.0 + far)];
+            let fan: Vec<_> = (0..4).map(|i| [square[i], square[(i + 1) % 4], middle]).collect();
+            assert!(cover(&fan, 16).iter().all(|&n| n == 1), "round {round}");
+        }
+    }
+
+    #[test]
+    fn only_centres_inside_count() {
+        let count = cover(&[[at(0.5, 0.5), at(3.5, 0.5), at(0.5, 3.5)]], 5);
+        let mut wanted = vec![0; 25];
+        for (x, y) in [(0, 0), (1, 0), (2, 0), (0, 1), (1, 1), (0, 2)] {
+            wanted[y * 5 + x] = 1;
+        }
+        assert_eq!(count, wanted);
+    }
+
+    #[test]
+    fn the_near_plane_cuts_to_a_triangle_or_a_quad() {
+        let p = |z: f64| DVec3::new(0.0, 0.0, z);
+        assert_eq!(cut_near(&[p(-1.0), p(1.0), p(1.0)]).1, 3);
+        assert_eq!(cut_near(&[p(-1.0), p(-1.0), p(1.0)]).1, 4);
+        assert_eq!(cut_near(&[p(1.0), p(1.0), p(1.0)]).1, 0);
+    }
+}

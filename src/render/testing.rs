@@ -1,0 +1,106 @@
+//! Shapes and data folders for this module's tests.
+
+use crate::geom::{Mesh, Solid};
+use glam::Vec3;
+use std::path::PathBuf;
+use std::sync::Arc;
+
+/// A solid of one part.
+pub fn solid(positions: Vec<Vec3>, triangles: Vec<[u32; 3]>) -> Solid {
+    let parts = vec![0; triangles.len()];
+    Solid::new(Arc::new(Mesh::new(positions, triangles, parts).unwrap()))
+}
+
+/// A surface of revolution about y through (radius, height) points given from the bottom up; with `capped`, the ends
+/// that are off the axis are closed by discs.
+pub fn lathe(profile: &[(f32, f32)], segments: u32, capped: bool) -> Solid {
+    let mut points = profile.to_vec();
+    if capped {
+        let (first, last) = (points[0], points[points.len() - 1]);
+        if first.0 > 0.0 {
+            points.insert(0, (0.0, first.1));
+        }
+        if last.0 > 0.0 {
+            points.push((0.0, last.1));
+        }
+    }
+    let mut positions = Vec::new();
+    for &(r, y) in &points {
+        for s in 0..segments {
+            let a = std::f32::consts::TAU * s as f32 / segments as f32;
+            positions.push(Vec3::new(r * a.sin(), y, r * a.cos()));
+        }
+    }
+    let mut triangles = Vec::new();
+    for ring in 0..points.len() as u32 - 1 {
+        for s in 0..segments {
+            let t = (s + 1) % segments;
+            let (a, b) = (ring * segments + s, ring * segments + t);
+            let (c, d) = (a + segments, b + segments);
+            if points[ring as usize].0 > 0.0 {
+                triangles.push([a, b, d]);
+            }
+            if points[ring as usize + 1].0 > 0.0 {
+                triangles.push([a, d, c]);
+            }
+        }
+    }
+    solid(positions, triangles)
+}
+
+/// The unit sphere about the origin.
+pub fn sphere(segments: u32, rings: u32) -> Solid {
+    let profile: Vec<_> = (0..=rings)
+        .map(|i| {
+            let a = std::f64::consts::PI * f64::from(i) / f64::from(rings);
+            let r = if i == 0 || i == rings { 0.0 } else { a.sin() };
+            (r as f32, -a.cos() as f32)
+        })
+        .collect();
+    lathe(&profile, segments, false)
+}
+
+/// A box with half extents, about the origin.
+pub fn cuboid(half: Vec3) -> Solid {
+    let corner = |i: u32| {
+        let side = |bit: u32| if i & bit == 0 { -1.0 } else { 1.0 };
+        half * Vec3::new(side(1), side(2), side(4))
+    };
+    let quads = [[0, 2, 3, 1], [4, 5, 7, 6], [0, 1, 5, 4], [2, 6, 7, 3], [0, 4, 6, 2], [1, 3, 7, 5]];
+    let triangles = quads.iter().flat_map(|&[a, b, c, d]| [[a, b, c], [a, c, d]]).collect();
+    solid((0..8).map(corner).collect(), triangles)
+}
+
+/// Uniform numbers in 0..1, the same in every run.
+pub struct Uniform(pub u64);
+
+impl Uniform {
+    /// The next number.
+    pub fn next(&mut self) -> f64 {
+        self.0 = self.0.wrapping_mul(6364136223846793005).wrapping_add(1442695040888963407);
+        let mut x = self.0;
+        x = (x ^ (x >> 33)).wrapping_mul(0xff51afd7ed558ccd);
+        ((x ^ (x >> 33)) >> 11) as f64 / (1u64 << 53) as f64
+    }
+
+    /// The next number, between two bounds.
+    pub fn between(&mut self, low: f64, high: f64) -> f64 {
+        low + (high - low) * self.next()
+    }
+}
+
+/// The folders of the object data set that hold a camera, with their names, sorted; none when it is not there.
+pub fn cases() -> Vec<(String, PathBuf)> {
+    let root = PathBuf::from(env!("CARGO_MANIFEST_DIR"));
+    let roots = ["../shared", "../../shared"].map(|at| root.join(at).join("data/objects"));
+    let mut out = Vec::new();
+    for folder in roots.iter().filter(|r| r.is_dir()).take(1).flat_map(|r| [r.clone(), r.join("real")]) {
+        for entry in std::fs::read_dir(folder).into_iter().flatten().flatten() {
+            if entry.path().join("camera.json").is_file() {
+                out.push((entry.file_name().to_string_lossy().into_owned(), entry.path()));
+            }
+        }
+    }
+    out.sort();
+    out
+}
