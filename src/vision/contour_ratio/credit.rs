@@ -92,10 +92,10 @@ impl Scratch {
     #[inline]
     pub(super) fn claim(&mut self, group: u32, length: f64, score: f64) {
         if let Some(claim) = self.claims.get_mut(group as usize) {
-            if claim.length == 0 && claim.score == 0 {
+            if claim.length == 0 {
                 self.touched.push(group);
             }
-            claim.length = claim.length.saturating_add((length * FIXED) as i64);
+            claim.length = claim.length.saturating_add(((length * FIXED) as i64).max(1));
             claim.score = claim.score.saturating_add((score * FIXED) as i64);
         }
     }
