@@ -119,12 +119,7 @@ pub(super) fn check_size(width: u32, height: u32) -> Result<(), ComparatorError>
 }
 
 /// An error unless `value` is finite and `holds`.
-pub(super) fn check(
-    option: &'static str,
-    range: &'static str,
-    value: f64,
-    holds: bool,
-) -> Result<(), ComparatorError> {
+pub(super) fn check(option: &'static str, range: &'static str, value: f64, holds: bool) -> Result<(), ComparatorError> {
     if value.is_finite() && holds { Ok(()) } else { Err(ComparatorError::Option { option, range }) }
 }
 

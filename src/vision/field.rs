@@ -133,11 +133,7 @@ impl Edges {
         let gy = (y * self.sy - 0.5).clamp(0.0, (h - 1) as f32);
         let (x0, y0) = ((gx as usize).min(w.saturating_sub(2)), (gy as usize).min(h.saturating_sub(2)));
         let (x1, y1) = ((x0 + 1).min(w - 1), (y0 + 1).min(h - 1));
-        Corners {
-            at: [y0 * w + x0, y0 * w + x1, y1 * w + x0, y1 * w + x1],
-            fx: gx - x0 as f32,
-            fy: gy - y0 as f32,
-        }
+        Corners { at: [y0 * w + x0, y0 * w + x1, y1 * w + x0, y1 * w + x1], fx: gx - x0 as f32, fy: gy - y0 as f32 }
     }
 }
 

@@ -6,7 +6,10 @@ use super::super::elements::Elements;
 use super::super::field::{Edge, Edges, channel, turn_between};
 
 /// Buckets along the longer side.
-const BUCKETS: f32 = 24.0;
+const BUCKETS: f32 = 32.0;
+
+/// Observed points that are measured; of more, every so many-th in the order of the buckets stands for its neighbours.
+const POINTS: usize = 1024;
 
 /// Memory that evaluations reuse.
 #[derive(Debug, Clone, Default)]
@@ -31,6 +34,8 @@ struct Piece {
 #[derive(Debug, Clone)]
 pub(super) struct Reverse {
     points: Vec<Piece>,
+    /// Observed points that each one stands for.
+    stands_for: f32,
     start: Vec<u32>,
     across: usize,
     down: usize,
@@ -44,7 +49,7 @@ impl Reverse {
         let side = (width.max(height) as f32 / BUCKETS).max(1.0);
         let across = ((width as f32 / side).ceil() as usize).max(1);
         let down = ((height as f32 / side).ceil() as usize).max(1);
-        let mut r = Reverse { points: Vec::new(), start: Vec::new(), across, down, side };
+        let mut r = Reverse { points: Vec::new(), stands_for: 1.0, start: Vec::new(), across, down, side };
         let (mut start, mut sorted) = (Vec::new(), Vec::new());
         let points: Vec<Piece> = grid
             .edges
@@ -58,6 +63,11 @@ impl Reverse {
             })
             .collect();
         r.sort(&points, &mut start, &mut sorted);
+        if sorted.len() > POINTS {
+            r.stands_for = sorted.len() as f32 / POINTS as f32;
+            let few: Vec<Piece> = (0..POINTS).map(|i| sorted[i * sorted.len() / POINTS]).collect();
+            r.sort(&few, &mut start, &mut sorted);
+        }
         r.start = start;
         r.points = sorted;
         r
@@ -131,7 +141,7 @@ impl Reverse {
                         best = best.min(e.edge.distance(p.edge.x, p.edge.y) + turned + e.cost);
                     }
                 }
-                f(2.0 * p.edge.half, best);
+                f(2.0 * p.edge.half * self.stands_for, best);
             }
         }
     }

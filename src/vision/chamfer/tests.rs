@@ -95,7 +95,8 @@ fn symmetric_distance_is_the_plain_one() {
     for radius in [0.02, 0.1, 0.3] {
         for per_radian in [0.0, 2.0] {
             let drawn = Pieces::new(128, 96).circle(0.5, 0.35, radius);
-            let both = ChamferOptions { symmetric: true, oriented: (per_radian > 0.0).then_some(per_radian), ..options() };
+            let both =
+                ChamferOptions { symmetric: true, oriented: (per_radian > 0.0).then_some(per_radian), ..options() };
             let one = ChamferOptions { symmetric: false, ..both.clone() };
             let both = Chamfer::prepare(&seen.map(), 128, 96, &both).unwrap().distance(&drawn.elements());
             let one = Chamfer::prepare(&seen.map(), 128, 96, &one).unwrap().distance(&drawn.elements());
@@ -173,7 +174,11 @@ fn gradient_is_that_of_differences() {
     }
     drawn.push(-0.2, 50.3, 1.0, 1.0);
     drawn.push(70.3, 128.3, 1.0, 1.0);
-    for o in [options(), ChamferOptions { truncate: Some(6.0), ..options() }, ChamferOptions { oriented: Some(1.0), ..options() }] {
+    for o in [
+        options(),
+        ChamferOptions { truncate: Some(6.0), ..options() },
+        ChamferOptions { oriented: Some(1.0), ..options() },
+    ] {
         let c = Chamfer::prepare(&seen, 128, 128, &ChamferOptions { sigma: 5.0, ..o }).unwrap();
         let mut out = vec![[0.0; 2]; drawn.x.len()];
         let value = c.gradient(&drawn.elements(), &mut out).unwrap();
@@ -183,7 +188,11 @@ fn gradient_is_that_of_differences() {
             for axis in 0..2 {
                 let score = |s: f32| {
                     let mut p = drawn.clone();
-                    if axis == 0 { p.x[i] += s } else { p.y[i] += s }
+                    if axis == 0 {
+                        p.x[i] += s
+                    } else {
+                        p.y[i] += s
+                    }
                     c.log_likelihood(&p.elements())
                 };
                 let numeric = (score(h) - score(-h)) / f64::from(2.0 * h);
