@@ -32,7 +32,8 @@ pub struct ChamferOptions {
     /// Mean of the distances or a sum of scores. Default mean.
     pub mode: Mode,
     /// Also measure from the observed contours to the rendered ones: the distance is the mean of both directions' means
-    /// (`Sum`: both directions' scores are added). Default off.
+    /// (`Sum`: both directions' scores are added). Of more than 1,024 observed points an even choice is measured. It
+    /// assumes that the picture holds nothing but the object: in clutter it prefers what lies near all of it. Default off.
     pub symmetric: bool,
     /// Distances count as this at most, in percent of the diagonal, above 0. Default none.
     pub truncate: Option<f64>,
