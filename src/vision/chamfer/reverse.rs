@@ -1,0 +1,156 @@
+//! Distances from the observed contours to the rendered ones, exact and continuous, by buckets of elements. Per evaluation
+//! it fills a scratch and walks the observed points; it renders nothing. Invariant: the result does not depend on the order
+//! of the elements, and every candidate that could be nearest is looked at.
+
+use super::super::elements::Elements;
+use super::super::field::{Edge, Edges, channel, turn_between};
+
+/// Buckets along the longer side.
+const BUCKETS: f32 = 32.0;
+
+/// Observed points that are measured; of more, every so many-th in the order of the buckets stands for its neighbours.
+const POINTS: usize = 1024;
+
+/// Memory that evaluations reuse.
+#[derive(Debug, Clone, Default)]
+pub struct Scratch {
+    pieces: Vec<Piece>,
+    sorted: Vec<Piece>,
+    /// Where each bucket starts in `sorted`, and at the end its length.
+    start: Vec<u32>,
+    /// Buckets that are not empty, with the least cost of a piece in each.
+    filled: Vec<(u32, f32)>,
+    near: Vec<(f32, u32)>,
+}
+
+/// A piece of contour and what it costs, in pixels, besides the distance.
+#[derive(Debug, Clone, Copy)]
+struct Piece {
+    edge: Edge,
+    cost: f32,
+}
+
+/// The observed points sorted by bucket, in pixels of the frame.
+#[derive(Debug, Clone)]
+pub(super) struct Reverse {
+    points: Vec<Piece>,
+    /// Observed points that each one stands for.
+    stands_for: f32,
+    start: Vec<u32>,
+    across: usize,
+    down: usize,
+    /// Side of a bucket in pixels.
+    side: f32,
+}
+
+impl Reverse {
+    /// Keeps the observed points in the frame's pixels.
+    pub fn new(grid: &Edges, width: u32, height: u32) -> Self {
+        let side = (width.max(height) as f32 / BUCKETS).max(1.0);
+        let across = ((width as f32 / side).ceil() as usize).max(1);
+        let down = ((height as f32 / side).ceil() as usize).max(1);
+        let mut r = Reverse { points: Vec::new(), stands_for: 1.0, start: Vec::new(), across, down, side };
+        let (mut start, mut sorted) = (Vec::new(), Vec::new());
+        let points: Vec<Piece> = grid
+            .edges
+            .iter()
+            .map(|e| {
+                let (tx, ty) = (e.tx / grid.sx, e.ty / grid.sy);
+                let norm = (tx * tx + ty * ty).sqrt();
+                let (x, y) = (e.x / grid.sx, e.y / grid.sy);
+                let edge = Edge { x, y, tx: tx / norm, ty: ty / norm, half: e.half * norm, turn: e.turn };
+                Piece { edge, cost: 0.0 }
+            })
+            .collect();
+        r.sort(&points, &mut start, &mut sorted);
+        if sorted.len() > POINTS {
+            r.stands_for = sorted.len() as f32 / POINTS as f32;
+            let few: Vec<Piece> = (0..POINTS).map(|i| sorted[i * sorted.len() / POINTS]).collect();
+            r.sort(&few, &mut start, &mut sorted);
+        }
+        r.start = start;
+        r.points = sorted;
+        r
+    }
+
+    /// Counting sort by bucket: `start[b]..start[b + 1]` are the pieces of bucket `b`.
+    fn sort(&self, pieces: &[Piece], start: &mut Vec<u32>, sorted: &mut Vec<Piece>) {
+        let cells = self.across * self.down;
+        start.clear();
+        start.resize(cells + 2, 0);
+        for p in pieces {
+            start[self.bucket(&p.edge) + 2] += 1;
+        }
+        for b in 2..cells + 2 {
+            start[b] += start[b - 1];
+        }
+        sorted.clear();
+        sorted.extend_from_slice(pieces);
+        for p in pieces {
+            let place = &mut start[self.bucket(&p.edge) + 1];
+            sorted[*place as usize] = *p;
+            *place += 1;
+        }
+        start.truncate(cells + 1);
+    }
+
+    fn bucket(&self, p: &Edge) -> usize {
+        let u = ((p.x / self.side).max(0.0) as usize).min(self.across - 1);
+        let v = ((p.y / self.side).max(0.0) as usize).min(self.down - 1);
+        v * self.across + u
+    }
+
+    /// Calls `f(length, distance)` for every observed point, in a fixed order, both in pixels. `turn` is the cost in pixels of
+    /// one channel's turn. An element partly in view costs up to a diagonal more, so that none appears suddenly. With nothing
+    /// in view distances are infinite.
+    pub fn each(&self, elements: &Elements<'_>, turn: f32, scratch: &mut Scratch, mut f: impl FnMut(f32, f32)) {
+        let Scratch { pieces, sorted, start, filled, near } = scratch;
+        let diagonal = elements.diagonal() as f32;
+        pieces.clear();
+        pieces.extend(elements.in_view().map(|e| {
+            let turn = if turn > 0.0 { channel(e.tx, e.ty) } else { 0.0 };
+            let edge = Edge { x: e.x, y: e.y, tx: e.tx, ty: e.ty, half: 0.5 * e.length, turn };
+            Piece { edge, cost: (1.0 - e.weight) * diagonal }
+        }));
+        // Pieces reach out of their bucket by half their length, and half a pixel at the border.
+        let slack = pieces.iter().map(|p| p.edge.half).fold(0.0, f32::max) + 1.0;
+        self.sort(pieces, start, sorted);
+        filled.clear();
+        filled.extend((0..self.across * self.down).filter(|&b| start[b] < start[b + 1]).map(|b| {
+            let held = &sorted[start[b] as usize..start[b + 1] as usize];
+            (b as u32, held.iter().map(|p| p.cost).fold(f32::INFINITY, f32::min))
+        }));
+        for b in 0..self.across * self.down {
+            let points = &self.points[self.start[b] as usize..self.start[b + 1] as usize];
+            if points.is_empty() {
+                continue;
+            }
+            let bound = filled.iter().map(|&(c, cost)| self.gap(b, c as usize).1 + cost).fold(f32::INFINITY, f32::min);
+            let reach = bound + 4.0 * turn + 2.0 * slack;
+            near.clear();
+            near.extend(filled.iter().map(|&(c, _)| (self.gap(b, c as usize).0, c)).filter(|n| n.0 <= reach));
+            near.sort_unstable_by(|a, b| a.0.total_cmp(&b.0).then(a.1.cmp(&b.1)));
+            for p in points {
+                let mut best = f32::INFINITY;
+                for &(gap, c) in near.iter() {
+                    if gap - slack > best {
+                        break;
+                    }
+                    for e in &sorted[start[c as usize] as usize..start[c as usize + 1] as usize] {
+                        let turned = if turn > 0.0 { turn * turn_between(e.edge.turn, p.edge.turn) } else { 0.0 };
+                        best = best.min(e.edge.distance(p.edge.x, p.edge.y) + turned + e.cost);
+                    }
+                }
+                f(2.0 * p.edge.half * self.stands_for, best);
+            }
+        }
+    }
+
+    /// Least and greatest distance in pixels between points of two buckets.
+    fn gap(&self, a: usize, b: usize) -> (f32, f32) {
+        let u = (a % self.across).abs_diff(b % self.across);
+        let v = (a / self.across).abs_diff(b / self.across);
+        let norm = |u: usize, v: usize| ((u * u + v * v) as f32).sqrt() * self.side;
+        (norm(u.saturating_sub(1), v.saturating_sub(1)), norm(u + 1, v + 1))
+    }
+}

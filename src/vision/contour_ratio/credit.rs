@@ -1,0 +1,120 @@
+//! How often observed edges pay: edges in one small cell of the picture and of like orientation form a group, whose positive
+//! scores are scaled down once the contour that claims them is longer than `credit` times the edges themselves. It scores
+//! nothing. Invariant: exact integer sums per group, so the order of the claims has no influence, and every share is a
+//! continuous function of the claims.
+//!
+//! Groups, and not single edge pixels, because a piece of contour at a coarse resolution is longer than an edge pixel.
+
+use super::super::field::{CHANNELS, Edges};
+use rustc_hash::FxHashMap;
+
+/// Where nothing pays.
+pub(super) const NO_GROUP: u32 = u32::MAX;
+
+/// Cells along the picture's longer side.
+const CELLS: f32 = 64.0;
+
+/// Steps per percent of contour and per unit of score.
+const FIXED: f64 = (1u64 << 32) as f64;
+
+/// The groups of observed edges.
+#[derive(Debug, Clone)]
+pub(super) struct Capacity {
+    /// Group of every edge.
+    group: Vec<u32>,
+    /// The length each group pays for, in percent of the diagonal.
+    limit: Vec<f64>,
+}
+
+impl Capacity {
+    /// Groups edges; a cell is no smaller than a pixel of the frame (`pixel`, in grid units).
+    pub fn new(grid: &Edges, pixel: f32, credit: f64) -> Self {
+        let side = (grid.width.max(grid.height) as f32 / CELLS).max(pixel);
+        let mut numbers: FxHashMap<(u32, u32, u32), u32> = FxHashMap::default();
+        let mut limit: Vec<f64> = Vec::new();
+        // Numbers are given in the order of the edges; the map is only looked up.
+        let group = grid
+            .edges
+            .iter()
+            .map(|e| {
+                let turn = (e.turn * 0.5).round() as u32 % (CHANNELS as u32 / 2);
+                let key = ((e.x / side) as u32, (e.y / side) as u32, turn);
+                let id = *numbers.entry(key).or_insert(limit.len() as u32);
+                if id as usize == limit.len() {
+                    limit.push(0.0);
+                }
+                limit[id as usize] += credit * f64::from(2.0 * e.half * grid.percent);
+                id
+            })
+            .collect();
+        Capacity { group, limit }
+    }
+
+    /// The group of an edge.
+    pub fn group(&self, edge: u32) -> u32 {
+        self.group.get(edge as usize).copied().unwrap_or(NO_GROUP)
+    }
+
+    /// The number of groups.
+    pub fn groups(&self) -> usize {
+        self.limit.len()
+    }
+}
+
+/// What a group was asked for.
+#[derive(Debug, Clone, Copy, Default)]
+struct Claim {
+    length: i64,
+    score: i64,
+}
+
+/// Memory that evaluations reuse.
+#[derive(Debug, Clone, Default)]
+pub struct Scratch {
+    claims: Vec<Claim>,
+    touched: Vec<u32>,
+}
+
+impl Scratch {
+    /// Makes room for `groups`, all unclaimed.
+    pub(super) fn begin(&mut self, groups: usize) {
+        for id in self.touched.drain(..) {
+            if let Some(claim) = self.claims.get_mut(id as usize) {
+                *claim = Claim::default();
+            }
+        }
+        if self.claims.len() < groups {
+            self.claims.resize(groups, Claim::default());
+        }
+    }
+
+    /// Adds a claim: a length of contour in percent and the score (length times log ratio) it would bring.
+    #[inline]
+    pub(super) fn claim(&mut self, group: u32, length: f64, score: f64) {
+        if let Some(claim) = self.claims.get_mut(group as usize) {
+            if claim.length == 0 {
+                self.touched.push(group);
+            }
+            claim.length = claim.length.saturating_add(((length * FIXED) as i64).max(1));
+            claim.score = claim.score.saturating_add((score * FIXED) as i64);
+        }
+    }
+
+    /// The scores paid. Each group's is rounded to the fixed point before they are added.
+    pub(super) fn settle(&self, capacity: &Capacity) -> f64 {
+        let mut total = 0i64;
+        for &id in &self.touched {
+            let (Some(claim), Some(&limit)) = (self.claims.get(id as usize), capacity.limit.get(id as usize)) else {
+                continue;
+            };
+            let limit = limit * FIXED;
+            let paid = if claim.length as f64 > limit {
+                (claim.score as f64 * (limit / claim.length as f64)) as i64
+            } else {
+                claim.score
+            };
+            total = total.saturating_add(paid);
+        }
+        total as f64 / FIXED
+    }
+}

@@ -1,0 +1,151 @@
+//! Rendered contours as the comparators read them, and what the comparators have in common: percent of the diagonal, which
+//! elements are in view, and errors. It is not a renderer and knows no meshes. Invariant: an element that is not finite or
+//! lies out of the picture has weight 0, so NaN cannot enter a score.
+
+use thiserror::Error;
+
+/// Rendered contour pieces in a frame of `width` x `height` pixels; pixel (0, 0) has its centre at (0.5, 0.5), y down.
+/// If the slices differ in length, the shortest counts.
+#[derive(Debug, Clone, Copy)]
+pub struct Elements<'a> {
+    /// Horizontal positions of the pieces' middles, in pixels.
+    pub x: &'a [f32],
+    /// Vertical positions of the pieces' middles, in pixels.
+    pub y: &'a [f32],
+    /// Unit tangents, horizontal part. The sign of a tangent does not matter.
+    pub tx: &'a [f32],
+    /// Unit tangents, vertical part.
+    pub ty: &'a [f32],
+    /// Lengths in pixels, about 1.
+    pub length: &'a [f32],
+    /// Width of the frame in pixels.
+    pub width: u32,
+    /// Height of the frame in pixels.
+    pub height: u32,
+}
+
+/// One element, in pixels of its frame.
+#[derive(Debug, Clone, Copy)]
+pub(super) struct Element {
+    /// Position.
+    pub x: f32,
+    /// Position.
+    pub y: f32,
+    /// Tangent.
+    pub tx: f32,
+    /// Tangent.
+    pub ty: f32,
+    /// Length in pixels, above 0.
+    pub length: f32,
+    /// How far it is in view: 1 inside, 0 from half a pixel outside the border, linear between.
+    pub weight: f32,
+    /// Its index in the slices.
+    pub index: usize,
+}
+
+impl Elements<'_> {
+    /// Length of the frame's diagonal in pixels.
+    pub fn diagonal(&self) -> f64 {
+        diagonal(self.width, self.height)
+    }
+
+    /// The number of elements.
+    pub fn len(&self) -> usize {
+        self.x.len().min(self.y.len()).min(self.tx.len()).min(self.ty.len()).min(self.length.len())
+    }
+
+    /// Whether there are none.
+    pub fn is_empty(&self) -> bool {
+        self.len() == 0
+    }
+
+    /// The elements that are finite, have a length, and are in view at least in part.
+    pub(super) fn in_view(&self) -> impl Iterator<Item = Element> {
+        let (w, h) = (self.width as f32, self.height as f32);
+        let lists = self.x.iter().zip(self.y).zip(self.tx.iter().zip(self.ty)).zip(self.length).enumerate();
+        lists.filter_map(move |(index, (((&x, &y), (&tx, &ty)), &length))| {
+            let sound = (x + y + tx + ty + length).is_finite() && length > 0.0;
+            let weight = (x.min(w - x).min(y).min(h - y) + 0.5).clamp(0.0, 1.0);
+            (sound && weight > 0.0).then_some(Element { x, y, tx, ty, length, weight, index })
+        })
+    }
+}
+
+/// Why a comparator could not be prepared or asked.
+#[derive(Debug, Clone, PartialEq, Eq, Error)]
+pub enum ComparatorError {
+    /// The frame has no pixels or too many.
+    #[error("a comparison at {width}x{height} pixels is not possible: each side must be 1 to 16384 pixels")]
+    Size {
+        /// Width asked for, in pixels.
+        width: u32,
+        /// Height asked for, in pixels.
+        height: u32,
+    },
+    /// An option is out of its range.
+    #[error("{option} must be {range}")]
+    Option {
+        /// The option's name.
+        option: &'static str,
+        /// What it may be.
+        range: &'static str,
+    },
+    /// The observed map's lists have different lengths.
+    #[error("the observed contours are damaged: their lists differ in length")]
+    Map,
+    /// A gradient was asked of a comparator that has none.
+    #[error("only the one-sided mean distance has a gradient")]
+    NoGradient,
+    /// The output slice is too short.
+    #[error("the gradient needs {need} places, not {got}")]
+    Output {
+        /// Number of elements.
+        need: usize,
+        /// Length of the slice.
+        got: usize,
+    },
+}
+
+/// Length in pixels of the diagonal of a `width` x `height` picture.
+pub(super) fn diagonal(width: u32, height: u32) -> f64 {
+    let (w, h) = (f64::from(width), f64::from(height));
+    (w * w + h * h).sqrt()
+}
+
+/// An error unless both sides are 1 to 16384.
+pub(super) fn check_size(width: u32, height: u32) -> Result<(), ComparatorError> {
+    let fine = |n: u32| (1..=16384).contains(&n);
+    if fine(width) && fine(height) { Ok(()) } else { Err(ComparatorError::Size { width, height }) }
+}
+
+/// An error unless `value` is finite and `holds`.
+pub(super) fn check(option: &'static str, range: &'static str, value: f64, holds: bool) -> Result<(), ComparatorError> {
+    if value.is_finite() && holds { Ok(()) } else { Err(ComparatorError::Option { option, range }) }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    #[test]
+    fn in_view_drops_what_cannot_be_scored() {
+        let nan = f32::NAN;
+        let e = Elements {
+            x: &[5.0, nan, 5.0, 5.0, -3.0, 0.0, 5.0],
+            y: &[5.0, 5.0, 5.0, 5.0, 5.0, 5.0, f32::INFINITY],
+            tx: &[1.0, 1.0, nan, 1.0, 1.0, 1.0, 1.0],
+            ty: &[0.0; 7],
+            length: &[1.0, 1.0, 1.0, 0.0, 1.0, 1.0, 1.0],
+            width: 10,
+            height: 10,
+        };
+        let kept: Vec<(usize, f32)> = e.in_view().map(|e| (e.index, e.weight)).collect();
+        assert_eq!(kept, [(0, 1.0), (5, 0.5)]);
+    }
+
+    #[test]
+    fn sizes() {
+        assert_eq!(diagonal(3, 4), 5.0);
+        assert!(check_size(0, 4).is_err() && check_size(4, 16385).is_err() && check_size(1, 16384).is_ok());
+    }
+}

@@ -1,0 +1,107 @@
+//! Scenes for the comparators' tests: circles and random strokes, as rendered pieces and as observed maps. Positions are given
+//! as fractions of the frame, so the same scene exists at every resolution.
+
+use super::contour_map::ContourMap;
+use super::elements::Elements;
+
+/// Elements that own their lists.
+#[derive(Debug, Clone, Default)]
+pub(super) struct Pieces {
+    pub x: Vec<f32>,
+    pub y: Vec<f32>,
+    pub tx: Vec<f32>,
+    pub ty: Vec<f32>,
+    pub length: Vec<f32>,
+    pub width: u32,
+    pub height: u32,
+}
+
+impl Pieces {
+    pub fn new(width: u32, height: u32) -> Self {
+        Pieces { width, height, ..Pieces::default() }
+    }
+
+    pub fn push(&mut self, x: f32, y: f32, angle: f32, length: f32) {
+        self.x.push(x);
+        self.y.push(y);
+        self.tx.push(libm::cosf(angle));
+        self.ty.push(libm::sinf(angle));
+        self.length.push(length);
+    }
+
+    /// A circle of pieces about a pixel long; the middle and radius as fractions of the width.
+    pub fn circle(mut self, cx: f32, cy: f32, r: f32) -> Self {
+        let w = self.width as f32;
+        let n = (std::f32::consts::TAU * r * w).ceil().max(8.0);
+        let step = std::f32::consts::TAU / n;
+        for i in 0..n as usize {
+            let a = (i as f32 + 0.5) * step;
+            let (x, y) = (cx + r * libm::cosf(a), cy + r * libm::sinf(a));
+            self.push(x * w, y * w, a + std::f32::consts::FRAC_PI_2, step * r * w);
+        }
+        self
+    }
+
+    pub fn elements(&self) -> Elements<'_> {
+        Elements {
+            x: &self.x,
+            y: &self.y,
+            tx: &self.tx,
+            ty: &self.ty,
+            length: &self.length,
+            width: self.width,
+            height: self.height,
+        }
+    }
+
+    /// As an observed map of the same size.
+    pub fn map(&self) -> ContourMap {
+        ContourMap {
+            width: self.width,
+            height: self.height,
+            x: self.x.clone(),
+            y: self.y.clone(),
+            tx: self.tx.clone(),
+            ty: self.ty.clone(),
+            strength: vec![1.0; self.x.len()],
+        }
+    }
+
+    /// In the opposite order.
+    pub fn reversed(&self) -> Self {
+        let mut r = self.clone();
+        for list in [&mut r.x, &mut r.y, &mut r.tx, &mut r.ty, &mut r.length] {
+            list.reverse();
+        }
+        r
+    }
+
+    /// Moved by some pixels.
+    pub fn moved(&self, dx: f32, dy: f32) -> Self {
+        let mut r = self.clone();
+        r.x.iter_mut().for_each(|x| *x += dx);
+        r.y.iter_mut().for_each(|y| *y += dy);
+        r
+    }
+}
+
+/// Numbers in 0..1 from a seed.
+pub(super) fn numbers(mut seed: u64) -> impl FnMut() -> f32 {
+    move || {
+        seed = seed.wrapping_mul(6364136223846793005).wrapping_add(1442695040888963407);
+        (seed >> 40) as f32 / (1u64 << 24) as f32
+    }
+}
+
+/// An observed map of `n` random strokes.
+pub(super) fn clutter(width: u32, height: u32, n: usize, seed: u64) -> Pieces {
+    let mut next = numbers(seed);
+    let mut pieces = Pieces::new(width, height);
+    for _ in 0..n {
+        let (x, y, angle) = (next() * width as f32, next() * height as f32, next() * 3.1);
+        for i in 0..12 {
+            pieces.push(x + i as f32 * libm::cosf(angle), y + i as f32 * libm::sinf(angle), angle, 1.0);
+        }
+    }
+    pieces
+}
