@@ -16,6 +16,7 @@ mod math;
 mod matrix;
 mod operators;
 mod reduce;
+pub mod scene;
 mod table;
 
 pub use args::Args;

@@ -2,7 +2,7 @@
 //!
 //! Not a scope: shadowing by a program's own names is the business of lowering.
 
-use super::{Builtin, covariance, data, distributions, forms, inference, list, math, matrix, operators, reduce};
+use super::{Builtin, covariance, data, distributions, forms, inference, list, math, matrix, operators, reduce, scene};
 use indexmap::IndexMap;
 use rustc_hash::FxBuildHasher;
 
@@ -36,7 +36,7 @@ pub(super) fn all() -> impl Iterator<Item = Builtin> {
         data::TABLE,
         inference::TABLE,
     ];
-    own.into_iter().flatten().copied()
+    own.into_iter().flatten().copied().chain(scene::all())
 }
 
 /// The built-ins a program sees, by index and by name.

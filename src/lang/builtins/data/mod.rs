@@ -7,9 +7,13 @@
 mod csv;
 mod json;
 
+use super::scene::{DepthValue, ImageValue, MaskValue, SolidValue};
 use super::{Arg, Args, Builtin, Type, arg, function};
+use crate::geom::{Solid, obj};
 use crate::lang::error::{Fault, FaultKind};
 use crate::lang::value::Value;
+use crate::vision::{ContourMap, DepthMap, Limits, Mask, Photo, VisionError};
+use std::sync::Arc;
 
 const SECTION: &str = "Data files";
 
@@ -22,6 +26,11 @@ const fn kind(name: &'static str, returns: Type, doc: &'static str) -> Builtin {
 pub(super) const TABLE: &[Builtin] = &[
     kind("csv", Type::Record, "A table with a header line: a record of columns, numbers, bools or strings."),
     kind("json", Type::Any, "JSON: objects are records, null is nothing."),
+    kind("image", Type::Object("an image"), "A photograph, PNG or JPEG; its contours are found when a likelihood looks."),
+    kind("contours", Type::Object("an image"), "A ready contour map: bright pixels are contour."),
+    kind("mask", Type::Object("a mask"), "A mask: bright pixels are the object."),
+    kind("depth", Type::Object("a depth map"), "A depth map: `.npy`, or a 16-bit PNG in thousandths of a scene unit."),
+    kind("mesh", Type::Object("a solid"), "A Wavefront OBJ mesh; each object or group in it is a part."),
 ];
 
 fn not_an_expression(a: &Args) -> Result<Value, Fault> {
@@ -40,9 +49,23 @@ pub fn kinds() -> impl Iterator<Item = &'static str> {
 /// # Errors
 /// An unknown kind, or bytes that are not of that kind: a message with the line where there are lines.
 pub fn load(kind: &str, file: &str, bytes: &[u8]) -> Result<Value, Fault> {
+    let limits = Limits::default();
+    let text = |e: VisionError| e.to_string();
     let loaded = match kind {
         "csv" => csv::parse(bytes),
         "json" => json::parse(bytes),
+        "image" => Photo::decode(bytes, &limits).map(|p| Value::object(ImageValue::photo(p))).map_err(text),
+        "contours" => Photo::decode(bytes, &limits)
+            .map(|p| ContourMap::from_image(&image::DynamicImage::from(p.pixels().clone()).to_luma8()))
+            .map(|m| Value::object(ImageValue::contours(m, None)))
+            .map_err(text),
+        "mask" => Mask::decode(bytes, &limits).map(|m| Value::object(MaskValue::new(m))).map_err(text),
+        "depth" => {
+            DepthMap::decode(bytes, 1000.0, &limits).map(|d| Value::object(DepthValue::new(d))).map_err(text)
+        }
+        "mesh" => obj::load(bytes)
+            .map(|m| Value::object(SolidValue(Solid::new(Arc::new(m)))))
+            .map_err(|e| e.to_string()),
         _ => {
             let fault = Fault::type_error(format!("there is no data of type `{kind}`"));
             return Err(match crate::diag::nearest(kind, kinds()) {

@@ -1,0 +1,262 @@
+//! Likelihoods of what is observed given a view.
+
+use super::observed::{DepthValue, ImageValue, MaskValue};
+use super::{VIEW, ViewValue, native};
+use crate::lang::builtins::{Arg, Args, Builtin, Type, arg, opt};
+use crate::lang::error::Fault;
+use crate::lang::value::{Likelihood, Value};
+use crate::render::{Contours, View};
+use crate::vision::chamfer::{self, Mode};
+use crate::vision::contour_ratio;
+use crate::vision::{
+    Chamfer, ChamferOptions, ContourRatio, ContourRatioOptions, DepthLikelihood, Elements, MaskLikelihood,
+};
+use std::cell::RefCell;
+use std::sync::Arc;
+
+const SECTION: &str = "Comparing";
+const SEEN: Arg = arg("view", VIEW, "The view.");
+const SIZE: Arg = opt("size", Type::Int, "128", "The longer side of the picture that is drawn, 8 to 4096.").unit("pixels");
+
+pub(super) const TABLE: &[Builtin] = &[
+    native(
+        "contour",
+        SECTION,
+        &[
+            SEEN,
+            SIZE,
+            opt("foreground", Type::Num, "0.75", "The share of rendered contour that has an edge of its own."),
+            opt("sd", Type::Num, "0.4", "The spread of its distance to that edge.").unit("percent of the diagonal"),
+            opt("truncate", Type::Num, "3.3", "From this distance on there is no edge near.").unit("percent of the diagonal"),
+            opt("credit", Type::Num, "2", "How many times over an observed edge pays."),
+            opt("weight", Type::Num, "0.5", "The power of the ratio of two pixels of contour in a picture of 256."),
+        ],
+        Type::Likelihood,
+        "The likelihood ratio of the observed contours: the object against clutter. The default for photographs.",
+        contour,
+    ),
+    native(
+        "chamfer",
+        SECTION,
+        &[
+            SEEN,
+            opt("sigma", Type::Num, "0.4", "The spread of the distance.").unit("percent of the diagonal"),
+            opt("mode", Type::Str, "\"mean\"", "\"mean\": one term for the mean distance, as in the paper; \"sum\": one for each percent of contour."),
+            opt("symmetric", Type::Bool, "false", "Measures from the observed to the rendered contours too."),
+            opt("truncate", Type::Num, "none", "Distances count as this at most.").unit("percent of the diagonal"),
+            opt("oriented", Type::Num, "none", "The distance that a difference of one radian counts.").unit("percent of the diagonal"),
+            SIZE,
+        ],
+        Type::Likelihood,
+        "The probabilistic chamfer distance of Kulkarni et al. 2014, section 2(c): no density over photographs.",
+        chamfer,
+    ),
+    native(
+        "mask",
+        SECTION,
+        &[
+            SEEN,
+            opt("eps_in", Type::Num, "0.05", "The probability that a pixel of the object is observed as background."),
+            opt("eps_out", Type::Num, "0.05", "The probability that a pixel of the background is observed as object."),
+            SIZE,
+        ],
+        Type::Likelihood,
+        "The probability of an observed mask: pixels flip independently.",
+        |a| {
+            let (eps_in, eps_out) = (a.num_or(1, 0.05)?, a.num_or(2, 0.05)?);
+            likelihood(MaskOf { view: view(a)?, size: size(a, 3)?, eps: [eps_in, eps_out] })
+        },
+    ),
+    native(
+        "depth",
+        SECTION,
+        &[
+            SEEN,
+            opt("sd", Type::Num, "0.05", "The spread of measured depths.").unit("scene units"),
+            opt("outlier", Type::Num, "0.05", "The share of measurements that are off."),
+            opt("range", Type::Num, "8", "The range over which those lie.").unit("scene units"),
+            SIZE,
+        ],
+        Type::Likelihood,
+        "The density of an observed depth map: normal about the rendered depth, with outliers; missing pixels say nothing.",
+        |a| {
+            let options = [a.positive_or(1, 0.05)?, a.num_or(2, 0.05)?, a.positive_or(3, 8.0)?];
+            likelihood(DepthOf { view: view(a)?, size: size(a, 4)?, options })
+        },
+    ),
+];
+
+fn likelihood(l: impl Likelihood + 'static) -> Result<Value, Fault> {
+    Ok(Value::Likelihood(Arc::new(l)))
+}
+
+fn view(a: &Args) -> Result<Arc<View>, Fault> {
+    a.object::<ViewValue>(0, "a view").map(|v| Arc::clone(&v.0))
+}
+
+fn size(a: &Args, i: usize) -> Result<u32, Fault> {
+    if a.given(i) { a.int_in(i, 8, 4096).map(|n| n as u32) } else { Ok(128) }
+}
+
+fn optional(a: &Args, i: usize) -> Result<Option<f64>, Fault> {
+    if a.given(i) { a.num(i).map(Some) } else { Ok(None) }
+}
+
+fn contour(a: &Args) -> Result<Value, Fault> {
+    let d = ContourRatioOptions::default();
+    let options = ContourRatioOptions {
+        foreground: a.num_or(2, d.foreground)?,
+        sd: a.num_or(3, d.sd)?,
+        truncate: a.num_or(4, d.truncate)?,
+        credit: a.num_or(5, d.credit)?,
+        weight: a.num_or(6, d.weight)?,
+        ..d
+    };
+    likelihood(ContourOf { view: view(a)?, size: size(a, 1)?, options })
+}
+
+fn chamfer(a: &Args) -> Result<Value, Fault> {
+    let mode = match a.choice(2, &["mean", "sum"])? {
+        "sum" => Mode::Sum,
+        _ => Mode::Mean,
+    };
+    let options = ChamferOptions {
+        sigma: a.positive_or(1, ChamferOptions::default().sigma)?,
+        mode,
+        symmetric: a.bool_or(3, false)?,
+        truncate: optional(a, 4)?,
+        oriented: optional(a, 5)?,
+    };
+    likelihood(ChamferOf { view: view(a)?, size: size(a, 6)?, options })
+}
+
+fn elements(c: &Contours) -> Elements<'_> {
+    Elements { x: &c.x, y: &c.y, tx: &c.tx, ty: &c.ty, length: &c.length, width: c.width, height: c.height }
+}
+
+/// The observed image, if its shape is that of the view's picture.
+fn image<'a>(observed: &'a Value, view: &View, what: &str) -> Result<&'a ImageValue, String> {
+    let Some(image) = observed.downcast::<ImageValue>() else {
+        return Err(format!("{what}: the observed value must be an image, got {}", observed.type_name()));
+    };
+    same_shape(image.size(), view, what)?;
+    Ok(image)
+}
+
+fn same_shape((w, h): (u32, u32), view: &View, what: &str) -> Result<(), String> {
+    let (cw, ch) = (view.camera().width, view.camera().height);
+    let (a, b) = (f64::from(w) * f64::from(ch), f64::from(h) * f64::from(cw));
+    if (a - b).abs() > 0.03 * a.max(b) {
+        return Err(format!("{what}: the observed picture has {w} x {h} pixels, the camera's {cw} x {ch}: another shape"));
+    }
+    Ok(())
+}
+
+thread_local! {
+    static RATIO: RefCell<contour_ratio::Scratch> = RefCell::default();
+    static CHAMFER: RefCell<chamfer::Scratch> = RefCell::default();
+}
+
+#[derive(Debug)]
+struct ContourOf {
+    view: Arc<View>,
+    size: u32,
+    options: ContourRatioOptions,
+}
+
+impl Likelihood for ContourOf {
+    fn name(&self) -> &'static str {
+        "scene.contour"
+    }
+
+    fn log_density(&self, observed: &Value) -> Result<f64, String> {
+        let image = image(observed, &self.view, self.name())?;
+        let contours = self.view.contours(self.size);
+        let key = (self.options.clone(), contours.width, contours.height);
+        let ratio = image.ratios.get(key, |(options, w, h)| {
+            ContourRatio::prepare(image.map(), *w, *h, options).map_err(|e| format!("scene.contour: {e}"))
+        })?;
+        Ok(RATIO.with_borrow_mut(|scratch| ratio.log_likelihood_with(&elements(&contours), scratch)))
+    }
+
+    fn is_proper(&self) -> bool {
+        false
+    }
+}
+
+#[derive(Debug)]
+struct ChamferOf {
+    view: Arc<View>,
+    size: u32,
+    options: ChamferOptions,
+}
+
+impl Likelihood for ChamferOf {
+    fn name(&self) -> &'static str {
+        "scene.chamfer"
+    }
+
+    fn log_density(&self, observed: &Value) -> Result<f64, String> {
+        let image = image(observed, &self.view, self.name())?;
+        let contours = self.view.contours(self.size);
+        let key = (self.options.clone(), contours.width, contours.height);
+        let chamfer = image.chamfers.get(key, |(options, w, h)| {
+            Chamfer::prepare(image.map(), *w, *h, options).map_err(|e| format!("scene.chamfer: {e}"))
+        })?;
+        Ok(CHAMFER.with_borrow_mut(|scratch| chamfer.log_likelihood_with(&elements(&contours), scratch)))
+    }
+
+    fn is_proper(&self) -> bool {
+        false
+    }
+}
+
+#[derive(Debug)]
+struct MaskOf {
+    view: Arc<View>,
+    size: u32,
+    eps: [f64; 2],
+}
+
+impl Likelihood for MaskOf {
+    fn name(&self) -> &'static str {
+        "scene.mask"
+    }
+
+    fn log_density(&self, observed: &Value) -> Result<f64, String> {
+        let Some(mask) = observed.downcast::<MaskValue>() else {
+            return Err(format!("scene.mask: the observed value must be a mask, got {}", observed.type_name()));
+        };
+        same_shape((mask.mask.width, mask.mask.height), &self.view, self.name())?;
+        let frame = self.view.frame(self.size);
+        let prepared = mask.prepared.get((self.eps, frame.width, frame.height), |([i, o], w, h)| {
+            MaskLikelihood::prepare(&mask.mask, *w, *h, *i, *o).map_err(|e| format!("scene.mask: {e}"))
+        })?;
+        Ok(prepared.log_likelihood(frame.mask()))
+    }
+}
+
+#[derive(Debug)]
+struct DepthOf {
+    view: Arc<View>,
+    size: u32,
+    options: [f64; 3],
+}
+
+impl Likelihood for DepthOf {
+    fn name(&self) -> &'static str {
+        "scene.depth"
+    }
+
+    fn log_density(&self, observed: &Value) -> Result<f64, String> {
+        let Some(depth) = observed.downcast::<DepthValue>() else {
+            return Err(format!("scene.depth: the observed value must be a depth map, got {}", observed.type_name()));
+        };
+        same_shape((depth.depth.width, depth.depth.height), &self.view, self.name())?;
+        let frame = self.view.frame(self.size);
+        let prepared = depth.prepared.get((self.options, frame.width, frame.height), |(options, w, h)| {
+            DepthLikelihood::prepare(&depth.depth, *w, *h, *options).map_err(|e| format!("scene.depth: {e}"))
+        })?;
+        Ok(prepared.log_likelihood(&frame.depth))
+    }
+}
