@@ -144,7 +144,10 @@ mod tests {
     fn bad_files_are_named() {
         let message = |text: &str| Camera::from_json(text).unwrap_err().to_string();
         for key in ["model", "position", "looks_along", "up", "image", "focal_px"] {
-            assert_eq!(message(&GOOD.replace(&format!("\"{key}\""), "\"x\"")), format!("the camera file has no `{key}`"));
+            assert_eq!(
+                message(&GOOD.replace(&format!("\"{key}\""), "\"x\"")),
+                format!("the camera file has no `{key}`")
+            );
         }
         for (from, to, key) in [
             ("pinhole", "fisheye", "`model`"),

@@ -210,9 +210,7 @@ impl Tracer<'_> {
         for face in faces {
             let Some(face) = mesh.topology.triangles.get(face as usize) else { continue };
             // The corner off the edge; the vertices of a crease are split, so positions are compared.
-            let opposite = face.iter().find(|&&v| {
-                mesh.positions.get(v as usize).is_some_and(|p| p != from && p != to)
-            });
+            let opposite = face.iter().find(|&&v| mesh.positions.get(v as usize).is_some_and(|p| p != from && p != to));
             let Some(&opposite) = opposite else { continue };
             let corners = face.map(|v| placement.point(mesh.positions[v as usize].as_dvec3()));
             let normal = (corners[1] - corners[0]).cross(corners[2] - corners[0]);

@@ -22,7 +22,10 @@ fn check_invariants(c: &Contours) {
 
 #[test]
 fn a_sphere_gives_a_circle() {
-    let camera = Camera { projection: Projection::Pinhole { focal_px: 232.0, cx: 70.0, cy: 60.0 }, ..Camera::default_for(128, 128) };
+    let camera = Camera {
+        projection: Projection::Pinhole { focal_px: 232.0, cx: 70.0, cy: 60.0 },
+        ..Camera::default_for(128, 128)
+    };
     let ball = sphere(96, 64).placed(place([0.0; 3], [0.4, 0.2, 0.1], 1.2));
     let c = Contours::of(&ball, &camera);
     check_invariants(&c);
@@ -47,7 +50,8 @@ fn a_box_shows_nine_edges_seen_from_a_corner() {
     };
     // Each edge of a cube turned with its diagonal to the viewer shows sqrt(2/3) of its length.
     let tilt = (1.0f64 / 2.0f64.sqrt()).atan();
-    let cube = cuboid(Vec3::ONE).placed(place([0.0; 3], [tilt, 0.0, 0.0], 1.0) * place([0.0; 3], [0.0, std::f64::consts::FRAC_PI_4, 0.0], 1.0));
+    let cube = cuboid(Vec3::ONE)
+        .placed(place([0.0; 3], [tilt, 0.0, 0.0], 1.0) * place([0.0; 3], [0.0, std::f64::consts::FRAC_PI_4, 0.0], 1.0));
     let c = Contours::of(&cube, &camera);
     check_invariants(&c);
     let wanted = 9.0 * 2.0 / 0.03 * (2.0f64 / 3.0).sqrt();
@@ -100,7 +104,13 @@ fn a_body_in_front_hides_contours() {
 #[test]
 fn the_far_rim_of_a_bowl_shows_on_both_sides() {
     let camera = Camera::default_for(128, 128);
-    let bowl = lathe(&[(0.0, -0.5), (0.6, -0.4), (0.9, 0.0), (1.0, 0.5)], 48, false);
+    let profile: Vec<_> = (0..24)
+        .map(|i| {
+            let a = f64::from(i) / 23.0 * std::f64::consts::FRAC_PI_2;
+            (a.sin() as f32, (0.5 - a.cos()) as f32)
+        })
+        .collect();
+    let bowl = lathe(&profile, 48, false);
     let seen = Contours::of(&bowl.placed(place([0.0; 3], [0.5, 0.0, 0.0], 1.0)), &camera);
     // From above: the whole rim and the outer outline.
     let rim = std::f64::consts::TAU * 0.77 * 29.0;
@@ -227,7 +237,8 @@ fn a_small_step_changes_little() {
         let thing = lathe(&smooth_profile(&mut random, 32), 48, true);
         let pose = random_pose(&mut random);
         let step = place([1e-3, -1e-3, 1e-3], [1e-3, 1e-3, -1e-3], 1.0);
-        let change = (smooth_mean(&thing.placed(pose), &camera) - smooth_mean(&thing.placed(step * pose), &camera)).abs();
+        let change =
+            (smooth_mean(&thing.placed(pose), &camera) - smooth_mean(&thing.placed(step * pose), &camera)).abs();
         total += change;
         most = most.max(change);
     }

@@ -99,10 +99,7 @@ fn a_slanted_plane_is_perspective_correct() {
 fn triangles_across_the_near_plane_are_cut() {
     // A floor from behind the camera to far in front of it.
     let corners = [(-500.0, 500.0), (500.0, 500.0), (500.0, -500.0), (-500.0, -500.0)];
-    let floor = solid(
-        corners.iter().map(|&(x, z)| Vec3::new(x, -1.0, z)).collect(),
-        vec![[0, 1, 2], [0, 2, 3]],
-    );
+    let floor = solid(corners.iter().map(|&(x, z)| Vec3::new(x, -1.0, z)).collect(), vec![[0, 1, 2], [0, 2, 3]]);
     let camera = Camera::default_for(40, 40);
     let frame = render(&floor, &camera);
     for y in 0..40 {

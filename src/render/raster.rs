@@ -20,6 +20,15 @@ pub(super) struct Run {
     pub step: f32,
 }
 
+/// The first pixel whose centre is not before `at`, from 0 to `side`. The same as rounding up, without a call to the
+/// library: NaN gives 0.
+#[inline]
+fn first_centre(at: f64, side: u32) -> u32 {
+    let at = (at - 0.5).max(0.0).min(f64::from(side));
+    let whole = at as u32;
+    whole + u32::from(f64::from(whole) < at)
+}
+
 /// One triangle, ready to be drawn.
 pub(super) struct Triangle {
     pub points: [Point; 3],
@@ -34,11 +43,10 @@ impl Triangle {
     #[inline]
     pub fn new(points: [Point; 3], width: u32, height: u32) -> Option<Triangle> {
         let [a, b, c] = points;
-        let first = |lo: f64| (lo - 0.5).ceil().max(0.0);
-        let past = |hi: f64, side: u32| (hi - 0.5).ceil().min(f64::from(side));
-        if first(a.y.min(b.y).min(c.y)) >= past(a.y.max(b.y).max(c.y), height)
-            || first(a.x.min(b.x).min(c.x)) >= past(a.x.max(b.x).max(c.x), width)
-        {
+        let misses = |a: f64, b: f64, c: f64, side: u32| {
+            first_centre(a.min(b).min(c), side) >= first_centre(a.max(b).max(c), side)
+        };
+        if misses(a.y, b.y, c.y, height) || misses(a.x, b.x, c.x, width) {
             return None;
         }
         let area = (b.x - a.x) * (c.y - a.y) - (b.y - a.y) * (c.x - a.x);
@@ -67,10 +75,9 @@ impl Triangle {
             std::mem::swap(&mut top, &mut middle);
         }
         let slope = |p: &Point, q: &Point| (q.x - p.x) / (q.y - p.y);
-        let row_at = |y: f64| (y - 0.5).ceil().clamp(0.0, f64::from(height)) as usize;
         let long = slope(&top, &bottom);
-        let limit = f64::from(width);
-        let column = |x: f64| (x - 0.5).ceil().max(0.0).min(limit) as usize;
+        let row_at = |y: f64| first_centre(y, height) as usize;
+        let column = |x: f64| first_centre(x, width) as usize;
         for (upper, lower) in [(&top, &middle), (&middle, &bottom)] {
             let (first, past) = (row_at(upper.y), row_at(lower.y));
             if first >= past {
@@ -120,8 +127,7 @@ pub(super) fn each_triangle(
         let Some(points) = points.get(base..base + count) else { return };
         base += count;
         for (face, &[i, j, k]) in item.mesh.topology.triangles.iter().enumerate() {
-            let (Some(a), Some(b), Some(c)) =
-                (points.get(i as usize), points.get(j as usize), points.get(k as usize))
+            let (Some(a), Some(b), Some(c)) = (points.get(i as usize), points.get(j as usize), points.get(k as usize))
             else {
                 continue;
             };

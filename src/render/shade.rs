@@ -68,8 +68,7 @@ mod tests {
 
     #[test]
     fn depth_alone_is_shown_too() {
-        let frame =
-            Frame { width: 2, height: 1, depth: vec![1.0, 2.0], part: Vec::new(), normal: Vec::new() };
+        let frame = Frame { width: 2, height: 1, depth: vec![1.0, 2.0], part: Vec::new(), normal: Vec::new() };
         let picture = shade(&frame);
         assert!(picture.get_pixel(0, 0)[0] < picture.get_pixel(1, 0)[0]);
     }

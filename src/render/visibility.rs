@@ -71,9 +71,7 @@ impl<'a> Depths<'a> {
     #[inline]
     pub fn visible(&self, x: f64, y: f64, depth: f64, look: &Look) -> bool {
         match *look {
-            Look::Outward { direction: [dx, dy], slack } => {
-                self.free(x + BESIDE * dx, y + BESIDE * dy, depth, slack)
-            }
+            Look::Outward { direction: [dx, dy], slack } => self.free(x + BESIDE * dx, y + BESIDE * dy, depth, slack),
             Look::BothSides { direction: [dx, dy], slack: [first, second] } => {
                 self.free(x + BESIDE * dx, y + BESIDE * dy, depth, first)
                     || self.free(x - BESIDE * dx, y - BESIDE * dy, depth, second)
