@@ -12,12 +12,14 @@
 use crate::diag::{Diagnostic, IntoDiagnostic, Severity, SourceMap, render};
 use crate::infer::draws::Sink;
 use crate::infer::{ChainError, ChainResult, Progress, RunOptions, default_plan, run_chains};
+use crate::lang::builtins::scene::{CameraValue, DepthValue, ImageValue, MaskValue};
 use crate::lang::builtins::{Table, data};
 use crate::lang::code::Code;
 use crate::lang::error::{Fault, FaultKind, RunError};
 use crate::lang::load::{Disk, Loaded, Loader, Nowhere, load, load_text, read, reason};
 use crate::lang::lower::{Compiled, Export, Inputs, Interface, Report, compile, inspect};
 use crate::lang::value::Value;
+use crate::render::Camera;
 use crate::report::{ChainDraws, Memory, Quantity, quantities, text_hash};
 use crate::rng::{Purpose, StreamKey};
 use crate::syntax::ast::KStmt;
@@ -64,6 +66,9 @@ impl IntoDiagnostic for RunError {
         d
     }
 }
+
+/// The argument that the run's camera stands in for.
+const RENDER: (&str, &str) = ("scene.render", "camera");
 
 /// A program on its way to a [`Model`]: loaded, its inputs not yet given.
 pub struct Program {
@@ -179,11 +184,36 @@ impl Program {
         self
     }
 
+    /// The camera of views that name none.
+    #[must_use]
+    pub fn camera(self, camera: Camera) -> Program {
+        self.default_argument(RENDER.0, RENDER.1, Value::object(CameraValue(camera)))
+    }
+
+    /// Without a camera, the default view in the shape of the first picture given.
+    fn default_camera(&mut self) {
+        if self.defaults.contains_key(&RENDER) {
+            return;
+        }
+        let size = self.data.values().find_map(|v| match v {
+            v if v.downcast::<ImageValue>().is_some() => v.downcast::<ImageValue>().map(ImageValue::size),
+            v if v.downcast::<MaskValue>().is_some() => {
+                v.downcast::<MaskValue>().map(|m| (m.mask.width, m.mask.height))
+            }
+            v => v.downcast::<DepthValue>().map(|d| (d.depth.width, d.depth.height)),
+        });
+        if let Some((width, height)) = size {
+            let camera = CameraValue(Camera::default_for(width, height));
+            self.defaults.insert(RENDER, Value::object(camera));
+        }
+    }
+
     /// Checks and lowers the program.
     ///
     /// # Errors
     /// Everything that is wrong with it.
     pub fn compile(mut self) -> Result<Model, Error> {
+        self.default_camera();
         let loader = &*self.loader;
         let read_data = |kind: &str, path: &str, folder: &str| {
             let beside = format!("{folder}{path}");

@@ -97,9 +97,10 @@ enum Flow {
     End,
 }
 
-/// A kernel that has run: where it stands in the program, on what, and what it did.
+/// A kernel that has run: where it stands in the program, on what, and what it did. Kernels written alike are one, so that
+/// what is learnt in a warm-up serves the loops after it.
 struct Instance {
-    place: usize,
+    places: Vec<usize>,
     selector: Selector,
     kernel: Box<dyn Kernel>,
     stats: KernelStats,
@@ -459,7 +460,15 @@ impl Runner<'_> {
             scope.selector = Selector::Minus(Box::new(scope.selector), Box::new(self.frozen.clone()));
         }
         let place = e as *const Expr as usize;
-        let known = self.instances.iter().position(|i| i.place == place && i.selector == scope.selector);
+        let mut known = self.instances.iter().position(|i| i.places.contains(&place) && i.selector == scope.selector);
+        if known.is_none() {
+            let label = self.label(e);
+            let alike = |i: &Instance| i.stats.name == label && i.selector == scope.selector;
+            known = self.instances.iter().position(alike);
+            if let Some(i) = known {
+                self.instances[i].places.push(place);
+            }
+        }
         let i = match known {
             Some(i) => i,
             None => {
@@ -488,7 +497,7 @@ impl Runner<'_> {
                     }
                 };
                 let stats = KernelStats { name: self.label(e), ..Default::default() };
-                self.instances.push(Instance { place, selector, kernel, stats });
+                self.instances.push(Instance { places: vec![place], selector, kernel, stats });
                 self.instances.len() - 1
             }
         };

@@ -133,7 +133,7 @@ pub fn inv_normal_cdf(p: f64) -> f64 {
     x - u / (1.0 + 0.5 * x * u)
 }
 
-/// The derivative of ln Gamma: recurrence up to 8, then the asymptotic series.
+/// The derivative of ln Gamma: recurrence up to 12, then the asymptotic series.
 pub fn digamma(x: f64) -> f64 {
     if x <= 0.0 {
         if x == libm::trunc(x) {
@@ -143,12 +143,14 @@ pub fn digamma(x: f64) -> f64 {
     }
     let mut x = x;
     let mut shift = 0.0;
-    while x < 8.0 {
+    while x < 12.0 {
         shift -= 1.0 / x;
         x += 1.0;
     }
     let t = 1.0 / (x * x);
-    let series = t * (1.0 / 12.0 - t * (1.0 / 120.0 - t * (1.0 / 252.0 - t * (1.0 / 240.0 - t * (1.0 / 132.0)))));
+    let series = t
+        * (1.0 / 12.0
+            - t * (1.0 / 120.0 - t * (1.0 / 252.0 - t * (1.0 / 240.0 - t * (1.0 / 132.0 - t * (691.0 / 32760.0))))));
     shift + libm::log(x) - 0.5 / x - series
 }
 

@@ -24,7 +24,7 @@ pub use save::{SaveError, SavedTrace};
 pub use select::{ChoiceKind, Pattern, PatternSegment, Selector};
 
 use crate::dist::{Datum, Dist};
-use crate::lang::code::{Code, Op, Operand};
+use crate::lang::code::{Code, DistSpec, Op, Operand};
 use crate::lang::error::RunError;
 use crate::lang::value::Value;
 use graph::Graph;
@@ -309,6 +309,16 @@ impl Trace {
     /// Every observation and factor with its log density, in the order of the program's blocks.
     pub fn observations(&self) -> Vec<(Address, f64)> {
         self.scored().into_iter().map(|(n, s)| (self.graph.address(&self.code, n), s)).collect()
+    }
+
+    /// Whether an observation's likelihood is no density over its data, so that its scale is a matter of choice.
+    pub fn is_pseudo(&self) -> bool {
+        let improper = |n: u32| {
+            let Op::Observe { dist: DistSpec::Value(o), .. } = self.graph.op(&self.code, n) else { return false };
+            let frame = self.graph.nodes[n as usize].frame;
+            matches!(self.graph.value(&self.code, frame, *o), Value::Likelihood(l) if !l.is_proper())
+        };
+        self.scored().into_iter().any(|(n, _)| improper(n))
     }
 
     fn scored(&self) -> Vec<(u32, f64)> {

@@ -104,7 +104,8 @@ mod tests {
 
     #[test]
     fn transparent_pixels_lie_on_white() {
-        let photo = Photo::decode(&png(RgbaImage::from_pixel(2, 1, Rgba([100, 0, 200, 0]))), &Limits::default()).unwrap();
+        let photo =
+            Photo::decode(&png(RgbaImage::from_pixel(2, 1, Rgba([100, 0, 200, 0]))), &Limits::default()).unwrap();
         assert_eq!(photo.pixels().get_pixel(1, 0).0, [255; 3]);
         let half = Photo::decode(&png(RgbaImage::from_pixel(1, 1, Rgba([0, 0, 0, 128]))), &Limits::default()).unwrap();
         assert_eq!(half.pixels().get_pixel(0, 0).0, [127; 3]);

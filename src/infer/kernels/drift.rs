@@ -110,7 +110,8 @@ impl Drift {
         let aim = if dimensions <= 1 { ONE_D } else { MANY_D };
         if let Some(s) = self.scales.get_mut(&key) {
             s.steps += 1.0;
-            let gain = libm::pow(s.steps, -0.6);
+            // Not below a twentieth: an annealed warm-up moves the target all the time.
+            let gain = libm::pow(s.steps, -0.6).max(0.05);
             s.log += gain * (f64::from(u8::from(accepted)) - aim) * 2.0;
             s.log = s.log.clamp(-20.0, 6.0);
         }

@@ -26,7 +26,11 @@ const fn kind(name: &'static str, returns: Type, doc: &'static str) -> Builtin {
 pub(super) const TABLE: &[Builtin] = &[
     kind("csv", Type::Record, "A table with a header line: a record of columns, numbers, bools or strings."),
     kind("json", Type::Any, "JSON: objects are records, null is nothing."),
-    kind("image", Type::Object("an image"), "A photograph, PNG or JPEG; its contours are found when a likelihood looks."),
+    kind(
+        "image",
+        Type::Object("an image"),
+        "A photograph, PNG or JPEG; its contours are found when a likelihood looks.",
+    ),
     kind("contours", Type::Object("an image"), "A ready contour map: bright pixels are contour."),
     kind("mask", Type::Object("a mask"), "A mask: bright pixels are the object."),
     kind("depth", Type::Object("a depth map"), "A depth map: `.npy`, or a 16-bit PNG in thousandths of a scene unit."),
@@ -60,12 +64,10 @@ pub fn load(kind: &str, file: &str, bytes: &[u8]) -> Result<Value, Fault> {
             .map(|m| Value::object(ImageValue::contours(m, None)))
             .map_err(text),
         "mask" => Mask::decode(bytes, &limits).map(|m| Value::object(MaskValue::new(m))).map_err(text),
-        "depth" => {
-            DepthMap::decode(bytes, 1000.0, &limits).map(|d| Value::object(DepthValue::new(d))).map_err(text)
+        "depth" => DepthMap::decode(bytes, 1000.0, &limits).map(|d| Value::object(DepthValue::new(d))).map_err(text),
+        "mesh" => {
+            obj::load(bytes).map(|m| Value::object(SolidValue(Solid::new(Arc::new(m))))).map_err(|e| e.to_string())
         }
-        "mesh" => obj::load(bytes)
-            .map(|m| Value::object(SolidValue(Solid::new(Arc::new(m)))))
-            .map_err(|e| e.to_string()),
         _ => {
             let fault = Fault::type_error(format!("there is no data of type `{kind}`"));
             return Err(match crate::diag::nearest(kind, kinds()) {

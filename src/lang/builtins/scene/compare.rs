@@ -16,7 +16,8 @@ use std::sync::Arc;
 
 const SECTION: &str = "Comparing";
 const SEEN: Arg = arg("view", VIEW, "The view.");
-const SIZE: Arg = opt("size", Type::Int, "128", "The longer side of the picture that is drawn, 8 to 4096.").unit("pixels");
+const SIZE: Arg =
+    opt("size", Type::Int, "128", "The longer side of the picture that is drawn, 8 to 4096.").unit("pixels");
 
 pub(super) const TABLE: &[Builtin] = &[
     native(
@@ -27,7 +28,8 @@ pub(super) const TABLE: &[Builtin] = &[
             SIZE,
             opt("foreground", Type::Num, "0.75", "The share of rendered contour that has an edge of its own."),
             opt("sd", Type::Num, "0.4", "The spread of its distance to that edge.").unit("percent of the diagonal"),
-            opt("truncate", Type::Num, "3.3", "From this distance on there is no edge near.").unit("percent of the diagonal"),
+            opt("truncate", Type::Num, "3.3", "From this distance on there is no edge near.")
+                .unit("percent of the diagonal"),
             opt("credit", Type::Num, "2", "How many times over an observed edge pays."),
             opt("weight", Type::Num, "0.5", "The power of the ratio of two pixels of contour in a picture of 256."),
         ],
@@ -41,10 +43,16 @@ pub(super) const TABLE: &[Builtin] = &[
         &[
             SEEN,
             opt("sigma", Type::Num, "0.4", "The spread of the distance.").unit("percent of the diagonal"),
-            opt("mode", Type::Str, "\"mean\"", "\"mean\": one term for the mean distance, as in the paper; \"sum\": one for each percent of contour."),
+            opt(
+                "mode",
+                Type::Str,
+                "\"mean\"",
+                "\"mean\": one term for the mean distance, as in the paper; \"sum\": one for each percent of contour.",
+            ),
             opt("symmetric", Type::Bool, "false", "Measures from the observed to the rendered contours too."),
             opt("truncate", Type::Num, "none", "Distances count as this at most.").unit("percent of the diagonal"),
-            opt("oriented", Type::Num, "none", "The distance that a difference of one radian counts.").unit("percent of the diagonal"),
+            opt("oriented", Type::Num, "none", "The distance that a difference of one radian counts.")
+                .unit("percent of the diagonal"),
             SIZE,
         ],
         Type::Likelihood,
@@ -147,7 +155,9 @@ fn same_shape((w, h): (u32, u32), view: &View, what: &str) -> Result<(), String>
     let (cw, ch) = (view.camera().width, view.camera().height);
     let (a, b) = (f64::from(w) * f64::from(ch), f64::from(h) * f64::from(cw));
     if (a - b).abs() > 0.03 * a.max(b) {
-        return Err(format!("{what}: the observed picture has {w} x {h} pixels, the camera's {cw} x {ch}: another shape"));
+        return Err(format!(
+            "{what}: the observed picture has {w} x {h} pixels, the camera's {cw} x {ch}: another shape"
+        ));
     }
     Ok(())
 }

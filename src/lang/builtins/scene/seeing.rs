@@ -1,7 +1,7 @@
 //! Cameras and views.
 
-use super::{CAMERA, CameraValue, SOLID, SolidValue, VIEW, ViewValue, native};
 use super::shapes::vector;
+use super::{CAMERA, CameraValue, SOLID, SolidValue, VIEW, ViewValue, native};
 use crate::lang::builtins::{Builtin, Type, arg, opt};
 use crate::lang::error::Fault;
 use crate::lang::value::Value;

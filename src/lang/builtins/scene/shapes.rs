@@ -15,9 +15,11 @@ pub(super) const TABLE: &[Builtin] = &[
         "lathe",
         SECTION,
         &[
-            arg("parts", Type::Any, "A profile `{ y: heights, r: radii }`, or an array of them, from the bottom up.").unit("scene units"),
+            arg("parts", Type::Any, "A profile `{ y: heights, r: radii }`, or an array of them, from the bottom up.")
+                .unit("scene units"),
             opt("sides", Type::Int, "48", "The number of flat sides, 3 to 1024."),
-            opt("thickness", Type::Num, "0", "Of the wall, for a vessel open at the top; 0 for a full body.").unit("scene units"),
+            opt("thickness", Type::Num, "0", "Of the wall, for a vessel open at the top; 0 for a full body.")
+                .unit("scene units"),
             opt("caps", Type::Str, "\"both\"", "Which ends are closed: \"both\", \"bottom\", \"top\" or \"none\"."),
         ],
         SOLID,
@@ -56,25 +58,18 @@ pub(super) const TABLE: &[Builtin] = &[
         "A box round the origin.",
         |a| cuboid(vector(a, 0, DVec3::ONE)?).map(solid).map_err(fault),
     ),
-    native(
-        "group",
-        SECTION,
-        &[arg("solids", Type::Array, "The solids.")],
-        SOLID,
-        "Several solids as one.",
-        |a| {
-            let n = a.get(0).len().unwrap_or(0);
-            let members = (0..n).map(|i| {
-                let v = a.get(0).element(i).unwrap_or_default();
-                v.downcast::<SolidValue>().map(|s| s.0.clone()).ok_or_else(|| a.element_wrong(0, "an array of solids", &v))
-            });
-            let members = members.collect::<Result<Vec<_>, _>>()?;
-            if members.is_empty() {
-                return Err(a.wrong(0, "an array of solids"));
-            }
-            Ok(Value::object(SolidValue(Solid::group(&members))))
-        },
-    ),
+    native("group", SECTION, &[arg("solids", Type::Array, "The solids.")], SOLID, "Several solids as one.", |a| {
+        let n = a.get(0).len().unwrap_or(0);
+        let members = (0..n).map(|i| {
+            let v = a.get(0).element(i).unwrap_or_default();
+            v.downcast::<SolidValue>().map(|s| s.0.clone()).ok_or_else(|| a.element_wrong(0, "an array of solids", &v))
+        });
+        let members = members.collect::<Result<Vec<_>, _>>()?;
+        if members.is_empty() {
+            return Err(a.wrong(0, "an array of solids"));
+        }
+        Ok(Value::object(SolidValue(Solid::group(&members))))
+    }),
     native(
         "centred",
         SECTION,

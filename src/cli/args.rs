@@ -1,0 +1,185 @@
+//! The command line.
+
+use clap::{Args, Parser, Subcommand};
+use std::path::PathBuf;
+use std::time::Duration;
+
+/// From a photograph back to a 3D scene, by Bayesian inference.
+#[derive(Debug, Parser)]
+#[command(name = "pcadlang", version, max_term_width = 100)]
+pub struct Cli {
+    /// What to do.
+    #[command(subcommand)]
+    pub command: Command,
+}
+
+/// The commands.
+#[derive(Debug, Subcommand)]
+pub enum Command {
+    /// Sample the scenes that explain what is observed
+    Run(Run),
+    /// Draw scenes from the prior and show them on one sheet
+    Sample(Sample),
+    /// Check programs without running them
+    Check(Check),
+    /// Find the contours of a photograph
+    Contours(Contours),
+    /// Explain a built-in, or list all of them
+    Doc(Doc),
+}
+
+/// What a program is given.
+#[derive(Args, Debug)]
+pub struct Given {
+    /// The program: a file, or the name of a shipped one such as lathe.pcad
+    #[arg(value_name = "PROG")]
+    pub program: String,
+    /// Set a `param`, its value as in a program; may be repeated
+    #[arg(long = "set", value_name = "NAME=VALUE", value_parser = pair)]
+    pub sets: Vec<(String, String)>,
+    /// The camera, as a JSON file; without one the default view (4.4 units across at distance 8)
+    #[arg(long, value_name = "FILE")]
+    pub camera: Option<PathBuf>,
+}
+
+/// `run`.
+#[derive(Args, Debug)]
+pub struct Run {
+    /// Program, parameters, camera
+    #[command(flatten)]
+    pub given: Given,
+    /// A file for a `data` item; the name may be left out if there is only one that fits
+    #[arg(long, value_name = "[NAME=]FILE")]
+    pub observe: Vec<String>,
+    /// A ready contour map (bright is contour) in place of the photograph's own contours
+    #[arg(long, value_name = "FILE")]
+    pub observe_contours: Option<PathBuf>,
+    /// The seed: same seed, same draws
+    #[arg(long, default_value_t = 1)]
+    pub seed: u64,
+    /// The number of chains
+    #[arg(long, default_value_t = 4, value_parser = clap::value_parser!(u32).range(1..=1024))]
+    pub chains: u32,
+    /// The number of threads; as many as the machine has, if left out
+    #[arg(long, value_parser = clap::value_parser!(u32).range(1..=1024))]
+    pub threads: Option<u32>,
+    /// Kernel applications per chain after warm-up, in place of what the program says
+    #[arg(long)]
+    pub steps: Option<u64>,
+    /// Kernel applications per chain in warm-up, in place of what the program says
+    #[arg(long)]
+    pub warmup: Option<u64>,
+    /// Time in all, such as 10s, 2m or 500ms; at most half of it is warm-up
+    #[arg(long, value_parser = duration)]
+    pub time: Option<Duration>,
+    /// The folder for results; runs/PROG if left out
+    #[arg(long, value_name = "DIR")]
+    pub out: Option<PathBuf>,
+    /// Re-run the whole program at each step: slow, and the same draws; for checking the engine
+    #[arg(long)]
+    pub no_incremental: bool,
+    /// Print the summary as JSON
+    #[arg(long)]
+    pub json: bool,
+    /// Print nothing but errors
+    #[arg(long)]
+    pub quiet: bool,
+}
+
+/// `sample`.
+#[derive(Args, Debug)]
+pub struct Sample {
+    /// Program, parameters, camera
+    #[command(flatten)]
+    pub given: Given,
+    /// How many
+    #[arg(short, default_value_t = 16, value_parser = clap::value_parser!(u32).range(1..=1024))]
+    pub n: u32,
+    /// The seed
+    #[arg(long, default_value_t = 1)]
+    pub seed: u64,
+    /// The picture to write
+    #[arg(long, value_name = "FILE", default_value = "sheet.png")]
+    pub out: PathBuf,
+    /// The longer side of each picture in pixels
+    #[arg(long, default_value_t = 192, value_parser = clap::value_parser!(u32).range(16..=2048))]
+    pub size: u32,
+}
+
+/// `check`.
+#[derive(Args, Debug)]
+pub struct Check {
+    /// The programs
+    #[arg(required = true, value_name = "PROG")]
+    pub programs: Vec<String>,
+}
+
+/// `contours`.
+#[derive(Args, Debug)]
+pub struct Contours {
+    /// The photograph
+    #[arg(value_name = "IMG")]
+    pub image: PathBuf,
+    /// The contour map to write
+    #[arg(short, long, value_name = "FILE", default_value = "contours.png")]
+    pub out: PathBuf,
+    /// The longer side at which contours are looked for, in pixels
+    #[arg(long, default_value_t = 256, value_parser = clap::value_parser!(u32).range(8..=8192))]
+    pub size: u32,
+}
+
+/// `doc`.
+#[derive(Args, Debug)]
+pub struct Doc {
+    /// The name of a built-in; all of them, as Markdown, if left out
+    pub name: Option<String>,
+}
+
+fn pair(text: &str) -> Result<(String, String), String> {
+    match text.split_once('=') {
+        Some((name, value)) if !name.trim().is_empty() => Ok((name.trim().to_owned(), value.trim().to_owned())),
+        _ => Err("expected NAME=VALUE".into()),
+    }
+}
+
+fn duration(text: &str) -> Result<Duration, String> {
+    let wrong = || "expected a time such as 10s, 2m, 1h or 500ms".to_owned();
+    let at = text.find(|c: char| c.is_ascii_alphabetic()).unwrap_or(text.len());
+    let (number, unit) = text.split_at(at);
+    let x: f64 = number.trim().parse().map_err(|_| wrong())?;
+    let scale = match unit.trim() {
+        "ms" => 1e-3,
+        "s" | "" => 1.0,
+        "m" | "min" => 60.0,
+        "h" => 3600.0,
+        _ => return Err(wrong()),
+    };
+    let seconds = x * scale;
+    if seconds.is_finite() && (0.0..1e9).contains(&seconds) {
+        Ok(Duration::from_secs_f64(seconds))
+    } else {
+        Err(wrong())
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+    use clap::CommandFactory;
+
+    #[test]
+    fn the_command_line_is_sound() {
+        Cli::command().debug_assert();
+        assert_eq!(duration("500ms"), Ok(Duration::from_millis(500)));
+        assert_eq!(duration("1.5m"), Ok(Duration::from_secs(90)));
+        assert_eq!(duration("7"), Ok(Duration::from_secs(7)));
+        assert!(
+            duration("soon").is_err()
+                && duration("-1s").is_err()
+                && duration("1d").is_err()
+                && duration("1e300h").is_err()
+        );
+        assert_eq!(pair("a = 1"), Ok(("a".into(), "1".into())));
+        assert!(pair("a").is_err() && pair("=1").is_err());
+    }
+}

@@ -1,0 +1,49 @@
+//! `pcadlang check`.
+
+use super::args::Check;
+use super::{Failure, has_colors};
+use pcadlang::Program;
+use pcadlang::diag::render;
+
+/// Checks each program and says what it wants from outside.
+pub fn check(a: &Check) -> Result<(), Failure> {
+    let mut failed = Vec::new();
+    for path in &a.programs {
+        let program = match Program::open(path) {
+            Ok(p) => p,
+            Err(e) => {
+                eprint!("{}", render(&e.sources, &e.diagnostics, has_colors()));
+                failed.push(path.as_str());
+                continue;
+            }
+        };
+        let interface = program.interface();
+        match program.without_data().compile() {
+            Ok(_) => {
+                println!("{path}: no mistakes found");
+                for p in interface.params {
+                    let (default, help) = (p.default.unwrap_or_default(), p.help.unwrap_or_default());
+                    println!("  --set {} = {default}  {help}", p.name);
+                }
+                for d in interface.data.iter().filter(|d| !d.has_default) {
+                    let (ty, help) = (d.ty.as_deref().unwrap_or("any"), d.help.as_deref().unwrap_or_default());
+                    println!("  --observe {}=FILE ({ty})  {help}", d.name);
+                }
+            }
+            Err(e) => {
+                eprint!("{}", render(&e.sources, &e.diagnostics, has_colors()));
+                failed.push(path.as_str());
+            }
+        }
+    }
+    if failed.is_empty() {
+        Ok(())
+    } else {
+        Err(super::plain(format!(
+            "{} of {} programs have mistakes: {}",
+            failed.len(),
+            a.programs.len(),
+            failed.join(", ")
+        )))
+    }
+}

@@ -1,0 +1,15 @@
+//! Reading and writing files with messages that name them.
+
+use super::{Failure, plain};
+use pcadlang::lang::load::reason;
+use std::path::Path;
+
+/// The bytes of a file.
+pub fn read(path: &Path) -> Result<Vec<u8>, Failure> {
+    std::fs::read(path).map_err(|e| plain(format!("cannot read {}: {}", path.display(), reason(&e))))
+}
+
+/// Writes a file.
+pub fn write(path: &Path, bytes: &[u8]) -> Result<(), Failure> {
+    std::fs::write(path, bytes).map_err(|e| plain(format!("cannot write {}: {}", path.display(), reason(&e))))
+}

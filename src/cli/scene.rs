@@ -1,0 +1,42 @@
+//! From a trace to pictures: finding the view of a program and drawing it.
+
+use pcadlang::lang::builtins::scene::{SolidValue, ViewValue};
+use pcadlang::lang::code::Operand;
+use pcadlang::render::{Camera, Contours, Frame, View};
+use pcadlang::report::pictures::{Drawn, Strokes};
+use pcadlang::rng::{Purpose, StreamKey};
+use pcadlang::trace::{Draws, Trace};
+use std::sync::Arc;
+
+/// Where values that no observation asks for are drawn.
+pub fn predictive(seed: u64, step: u64) -> Draws {
+    Draws { key: StreamKey::new(seed, u32::MAX, Purpose::PREDICT), step, lane: 0 }
+}
+
+/// The program's view: the last top-level name that is one, or the last solid before a camera.
+pub fn view(trace: &mut Trace, draws: Draws, camera: Option<Camera>) -> Option<Arc<View>> {
+    let globals: Vec<Operand> = trace.code().globals.values().rev().copied().collect();
+    let mut solid = None;
+    for o in globals {
+        let Ok(values) = trace.query(&[o], draws) else { continue };
+        let Some(v) = values.first() else { continue };
+        if let Some(v) = v.downcast::<ViewValue>() {
+            return Some(Arc::clone(&v.0));
+        }
+        if solid.is_none() {
+            solid = v.downcast::<SolidValue>().map(|s| s.0.clone());
+        }
+    }
+    let camera = camera.unwrap_or_else(|| Camera::default_for(256, 256));
+    solid.map(|s| Arc::new(View::new(s, camera)))
+}
+
+/// A frame as the reports want it.
+pub fn drawn(f: &Frame) -> Drawn<'_> {
+    Drawn { width: f.width, height: f.height, depth: &f.depth, normal: &f.normal }
+}
+
+/// Contours as the reports want them.
+pub fn strokes(c: &Contours) -> Strokes<'_> {
+    Strokes { width: c.width, height: c.height, x: &c.x, y: &c.y, tx: &c.tx, ty: &c.ty, length: &c.length }
+}
