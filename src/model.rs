@@ -198,9 +198,9 @@ impl Program {
         let size = self.data.values().find_map(|v| match v {
             v if v.downcast::<ImageValue>().is_some() => v.downcast::<ImageValue>().map(ImageValue::size),
             v if v.downcast::<MaskValue>().is_some() => {
-                v.downcast::<MaskValue>().map(|m| (m.mask.width, m.mask.height))
+                v.downcast::<MaskValue>().map(|m| (m.mask.width(), m.mask.height()))
             }
-            v => v.downcast::<DepthValue>().map(|d| (d.depth.width, d.depth.height)),
+            v => v.downcast::<DepthValue>().map(|d| (d.depth.width(), d.depth.height())),
         });
         if let Some((width, height)) = size {
             let camera = CameraValue(Camera::default_for(width, height));

@@ -209,6 +209,5 @@ mod tests {
         assert_eq!(bits, GOLDEN, "{bits:#x?}");
     }
 
-    const GOLDEN: [u64; 4] =
-        [0xbfd9_147c_3b1d_ce9e, 0xbffc_04db_b225_6d9a, 0x3fda_26ea_9e14_562a, 0xbfd2_00e3_4a50_0ee6];
+    const GOLDEN: [u64; 4] = [0xbfd9147c3b1dce9e, 0xbffc04dbb2256d9a, 0x3fda26ea9e14562a, 0xbfd200e34a500ee6];
 }

@@ -7,7 +7,7 @@ use pcadlang::Program;
 use pcadlang::lang::builtins::scene::ImageValue;
 use pcadlang::lang::value::Value;
 use pcadlang::render::Camera;
-use pcadlang::vision::{ContourMap, Limits, Photo};
+use pcadlang::vision::{ContourMap, Limits, Photo, photo};
 use std::path::Path;
 
 /// Opens the program, with its parameters and camera.
@@ -44,7 +44,7 @@ pub fn observe(mut program: Program, a: &Run) -> Result<(Program, Option<Photo>)
         }
     }
     if let Some(path) = &a.observe_contours {
-        let map = ContourMap::from_image(&DynamicImage::from(decode(path)?.pixels().clone()).to_luma8());
+        let map = ContourMap::from_image(&DynamicImage::from(decode(path)?.rgb().clone()).to_luma8());
         let name = match &image {
             Some((name, _)) => name.clone(),
             None => only_image(&program)?,
@@ -57,7 +57,7 @@ pub fn observe(mut program: Program, a: &Run) -> Result<(Program, Option<Photo>)
 
 fn decode(path: &Path) -> Result<Photo, Failure> {
     let bytes = files::read(path)?;
-    Photo::decode(&bytes, &Limits::default()).map_err(|e| plain(format!("{}: {e}", path.display())))
+    photo::decode(&bytes, &Limits::default()).map_err(|e| plain(format!("{}: {e}", path.display())))
 }
 
 /// The name and path of `NAME=FILE`, or the only item that a plain `FILE` can be for.

@@ -224,12 +224,12 @@ fn draw(
     let large = pictures::picture_size(width, height);
     let (contours, picture) = (view.contours(size), view.frame(large.0.max(large.1)));
     let (strokes, drawn) = (scene::strokes(&contours), scene::drawn(&picture));
-    let overlay = encode(png(&pictures::overlay(photo.map(Photo::pixels), &drawn, &strokes)))?;
+    let overlay = encode(png(&pictures::overlay(photo.map(Photo::rgb), &drawn, &strokes)))?;
     let lines = encode(png(&pictures::contours(frame.width, frame.height, &strokes)))?;
     write(dir, "overlay.png", &overlay)?;
     write(dir, "contours.png", &lines)?;
     if let Some(p) = photo {
-        let resized = image::imageops::resize(p.pixels(), large.0, large.1, image::imageops::FilterType::Triangle);
+        let resized = image::imageops::resize(p.rgb(), large.0, large.1, image::imageops::FilterType::Triangle);
         shown.pictures.push(("the photograph", encode(png(&resized))?));
     }
     shown.pictures.push(("the best draw over it", overlay));

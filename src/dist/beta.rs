@@ -1,70 +1,82 @@
 //! The beta distribution.
 
+use super::draw::{ln_gamma_draw, x_log_y, x_log1p_y};
 use super::param::positive;
-use super::{Datum, Distribution, Gradient, ParamError, Support, number};
-use crate::num::{digamma, ln_beta};
+use super::{ParamError, Scalar, Slope, Support};
+use crate::num::{LN_SQRT_2PI, deviance, digamma, expit, ln_beta, stirling_error};
 use crate::rng::Stream;
 
-/// beta(a, b)
+/// From here on for both parameters, the saddle-point form is used.
+const LARGE: f64 = 64.0;
+
+/// `beta(a, b)`. At 0 and 1 the density is its limit: a pole (+inf) for a parameter below 1, 0 for one above.
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub struct Beta {
     a: f64,
     b: f64,
-    norm: f64,
+    log_norm: f64,
 }
 
 impl Beta {
-    /// Two shapes.
-    ///
-    /// # Errors
-    /// Unless both are positive and finite.
-    pub fn new(a: f64, b: f64) -> Result<Self, ParamError> {
-        let (a, b) = (positive("beta", "a", a)?, positive("beta", "b", b)?);
-        Ok(Beta { a, b, norm: -ln_beta(a, b) })
+    /// With these shapes; fails unless both are positive and finite.
+    pub fn new(a: f64, b: f64) -> Result<Beta, ParamError> {
+        let (a, b) = (positive(Self::NAME, "a", a)?, positive(Self::NAME, "b", b)?);
+        let log_norm = if a.min(b) < LARGE {
+            -ln_beta(a, b)
+        } else {
+            let (k, l) = (a - 1.0, b - 1.0);
+            let n = k + l;
+            let errors = stirling_error(n) - stirling_error(k) - stirling_error(l);
+            errors + libm::log(n + 1.0) - LN_SQRT_2PI - 0.5 * (libm::log(k) + libm::log(l / n))
+        };
+        Ok(Beta { a, b, log_norm })
     }
 }
 
-/// (k - 1) ln x, with 0 ln 0 = 0.
-pub(super) fn power_term(k: f64, ln_x: f64) -> f64 {
-    if k == 1.0 { 0.0 } else { (k - 1.0) * ln_x }
-}
+impl Scalar for Beta {
+    const NAME: &'static str = "beta";
 
-impl Distribution for Beta {
-    fn name(&self) -> &'static str {
-        "beta"
-    }
-
-    fn support(&self) -> Support {
+    fn number_support(&self) -> Support {
         Support::Interval { lo: 0.0, hi: 1.0 }
     }
 
-    fn sample(&self, rng: &mut Stream) -> Datum {
-        // From two gammas in log space, so that small shapes do not end in 0/0; kept off the ends, where the density may
-        // be infinite.
-        let (x, y) = (super::gamma::ln_gamma_draw(self.a, rng), super::gamma::ln_gamma_draw(self.b, rng));
-        let p = crate::num::expit(x - y);
-        Datum::Num(p.clamp(f64::MIN_POSITIVE, 1.0 - f64::EPSILON / 2.0))
+    fn draw(&self, rng: &mut Stream) -> f64 {
+        let (x, y) = (ln_gamma_draw(self.a, rng), ln_gamma_draw(self.b, rng));
+        expit(x - y).clamp(f64::MIN_POSITIVE, 1f64.next_down())
     }
 
-    /// At an end where the density grows without bound (a shape below 1) it is +inf.
-    fn log_density(&self, x: &Datum) -> f64 {
-        let x = number(x);
+    #[inline]
+    fn log_density_num(&self, x: f64) -> f64 {
         if !(0.0..=1.0).contains(&x) {
             return f64::NEG_INFINITY;
         }
-        let d = self.norm + power_term(self.a, libm::log(x)) + power_term(self.b, libm::log1p(-x));
-        if d.is_nan() { f64::NEG_INFINITY } else { d }
+        let (k, l) = (self.a - 1.0, self.b - 1.0);
+        if self.a.min(self.b) < LARGE {
+            self.log_norm + x_log_y(k, x) + x_log1p_y(l, -x)
+        } else if x == 0.0 || x == 1.0 {
+            f64::NEG_INFINITY
+        } else {
+            let n = k + l;
+            self.log_norm - deviance(k, n * x) - deviance(l, n * (1.0 - x))
+        }
     }
 
-    fn gradient(&self, x: &Datum) -> Option<Gradient> {
-        let x = number(x);
-        if !(x > 0.0 && x < 1.0) {
-            return None;
-        }
-        let both = digamma(self.a + self.b);
-        Some(Gradient {
-            x: vec![(self.a - 1.0) / x - (self.b - 1.0) / (1.0 - x)],
-            params: vec![libm::log(x) - digamma(self.a) + both, libm::log1p(-x) - digamma(self.b) + both],
-        })
+    fn slope(&self, x: f64) -> Slope {
+        let (a, b) = (self.a, self.b);
+        let all = digamma(a + b);
+        let left = if a == 1.0 { 0.0 } else { (a - 1.0) / x };
+        let right = if b == 1.0 { 0.0 } else { (b - 1.0) / (1.0 - x) };
+        let floor = f64::MIN_POSITIVE;
+        let by_a = libm::log(x.max(floor)) + all - digamma(a);
+        Slope::new(left - right, [by_a, libm::log1p(-x).max(f64::MIN) + all - digamma(b)])
+    }
+
+    fn number_mean(&self) -> Option<f64> {
+        Some(1.0 / (1.0 + self.b / self.a))
+    }
+
+    fn number_sd(&self) -> Option<f64> {
+        let m = 1.0 / (1.0 + self.b / self.a);
+        Some((m * (1.0 - m) / (self.a + self.b + 1.0)).sqrt())
     }
 }

@@ -1,75 +1,88 @@
-//! The categorical distribution.
+//! An index drawn in proportion to weights.
 
-use super::{Datum, Distribution, Gradient, ParamError, Support, number};
-use crate::num::log_sum_exp;
+use super::{ParamError, Scalar, Slope, Support};
 use crate::rng::Stream;
 
-/// categorical(weights): one of 0, 1, … with probability in proportion to its weight
+/// `categorical(weights)`: 0, 1, … with these weights, which need not sum to 1.
 #[derive(Clone, Debug, PartialEq)]
 pub struct Categorical {
-    weights: Vec<f64>,
-    log_total: f64,
+    weights: Box<[f64]>,
+    total: f64,
 }
 
 impl Categorical {
-    /// One weight for each value; they need not sum to 1.
-    ///
-    /// # Errors
-    /// Unless all are finite and at least 0, and one is positive.
-    pub fn new(weights: &[f64]) -> Result<Self, ParamError> {
+    /// With these weights; fails unless all are finite and not negative, and their sum is positive and finite.
+    pub fn new(weights: &[f64]) -> Result<Categorical, ParamError> {
         if let Some(w) = weights.iter().find(|w| !(w.is_finite() && **w >= 0.0)) {
-            return Err(ParamError::new("categorical", "weights", "finite and at least 0", w));
+            return Err(ParamError::new(Self::NAME, "weights", w, "must be finite and not negative"));
         }
-        let logs: Vec<f64> = weights.iter().map(|w| libm::log(*w)).collect();
-        let log_total = log_sum_exp(&logs);
-        if log_total == f64::NEG_INFINITY {
-            return Err(ParamError::new("categorical", "weights", "not all 0", format!("{weights:?}")));
+        let total: f64 = weights.iter().sum();
+        if !(total > 0.0 && total.is_finite()) {
+            return Err(ParamError::new(Self::NAME, "weights", total, "must have a positive, finite sum"));
         }
-        Ok(Categorical { weights: weights.to_vec(), log_total })
+        Ok(Categorical { weights: weights.into(), total })
+    }
+
+    /// The probability of index `i`.
+    pub fn probability(&self, i: usize) -> f64 {
+        self.weights.get(i).map_or(0.0, |w| w / self.total)
     }
 }
 
-impl Distribution for Categorical {
-    fn name(&self) -> &'static str {
-        "categorical"
-    }
+impl Scalar for Categorical {
+    const NAME: &'static str = "categorical";
 
-    fn support(&self) -> Support {
+    fn number_support(&self) -> Support {
         Support::Integers { lo: 0, hi: Some(self.weights.len() as i64 - 1) }
     }
 
-    fn sample(&self, rng: &mut Stream) -> Datum {
-        let largest = self.weights.iter().copied().fold(0.0, f64::max);
-        let total: f64 = self.weights.iter().map(|w| w / largest).sum();
-        let mut u = rng.uniform() * total;
+    fn draw(&self, rng: &mut Stream) -> f64 {
+        let mut u = rng.uniform() * self.total;
         let mut last = 0;
-        for (i, w) in self.weights.iter().enumerate() {
-            if *w == 0.0 {
-                continue;
-            }
+        for (i, w) in self.weights.iter().enumerate().filter(|(_, w)| **w > 0.0) {
             last = i;
-            u -= w / largest;
-            if u < 0.0 {
+            if u < *w {
                 break;
             }
+            u -= w;
         }
-        Datum::Num(last as f64)
+        last as f64
     }
 
-    fn log_density(&self, x: &Datum) -> f64 {
-        let k = number(x);
-        if k >= 0.0 && k == libm::trunc(k) && k < self.weights.len() as f64 {
-            libm::log(self.weights[k as usize]) - self.log_total
-        } else {
-            f64::NEG_INFINITY
+    #[inline]
+    fn log_density_num(&self, x: f64) -> f64 {
+        if !(x >= 0.0 && x == libm::trunc(x)) {
+            return f64::NEG_INFINITY;
+        }
+        match self.weights.get(x as usize) {
+            Some(w) if *w > 0.0 => libm::log(*w) - libm::log(self.total),
+            _ => f64::NEG_INFINITY,
         }
     }
 
-    fn gradient(&self, x: &Datum) -> Option<Gradient> {
-        let k = self.support().contains(x).then(|| number(x) as usize)?;
-        let total = libm::exp(self.log_total);
-        let by_weight = |i: usize| if i == k { 1.0 / self.weights[i] } else { 0.0 } - 1.0 / total;
-        let params: Vec<f64> = (0..self.weights.len()).map(by_weight).collect();
-        params.iter().all(|p| p.is_finite()).then_some(Gradient { x: Vec::new(), params })
+    fn slope(&self, x: f64) -> Slope {
+        let mut slope = Slope::discrete([]);
+        slope.params.extend(self.weights.iter().map(|_| -1.0 / self.total));
+        if let (Some(s), Some(w)) = (slope.params.get_mut(x as usize), self.weights.get(x as usize)) {
+            *s += 1.0 / w;
+        }
+        slope
+    }
+
+    fn number_mean(&self) -> Option<f64> {
+        Some(self.weights.iter().enumerate().map(|(i, w)| i as f64 * (w / self.total)).sum())
+    }
+
+    fn number_sd(&self) -> Option<f64> {
+        let mean = self.number_mean()?;
+        let square = |x: f64| x * x;
+        Some(
+            self.weights
+                .iter()
+                .enumerate()
+                .map(|(i, w)| square(i as f64 - mean) * (w / self.total))
+                .sum::<f64>()
+                .sqrt(),
+        )
     }
 }

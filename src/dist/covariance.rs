@@ -1,155 +1,177 @@
-//! Covariance functions of Gaussian processes (Rasmussen and Williams 2006, chapter 4).
+//! Covariance functions of one variable: the usual stationary ones, their sums and products. Not a distribution.
 
 use super::ParamError;
 use super::param::positive;
 use nalgebra::DMatrix;
 use std::fmt;
 use std::ops::{Add, Mul};
+use std::sync::Arc;
 
-/// A covariance function k(x, y) of numbers.
+/// A positive semi-definite function of two points, with variance `sd^2` at one.
 #[derive(Clone, Debug, PartialEq)]
+#[non_exhaustive]
 pub enum Covariance {
-    /// sd^2 exp(-(x - y)^2 / (2 length^2))
+    /// sd^2 exp(-d^2 / (2 length^2)).
     SqExp {
-        /// The length over which values stay alike.
+        /// Over which values stay alike, in units of the points.
         length: f64,
         /// The standard deviation.
         sd: f64,
     },
-    /// Matérn with nu = 3/2.
+    /// sd^2 (1 + r) exp(-r), r = sqrt(3) d / length.
     Matern32 {
-        /// As above.
-        length: f64,
-        /// As above.
-        sd: f64,
-    },
-    /// Matérn with nu = 5/2.
-    Matern52 {
-        /// As above.
-        length: f64,
-        /// As above.
-        sd: f64,
-    },
-    /// sd^2 exp(-2 sin^2(pi (x - y) / period) / length^2)
-    Periodic {
-        /// The period.
-        period: f64,
-        /// The length of likeness, as a fraction of a period.
+        /// Over which values stay alike, in units of the points.
         length: f64,
         /// The standard deviation.
         sd: f64,
     },
-    /// sd^2 where x and y are the same point.
+    /// sd^2 (1 + r + r^2 / 3) exp(-r), r = sqrt(5) d / length.
+    Matern52 {
+        /// Over which values stay alike, in units of the points.
+        length: f64,
+        /// The standard deviation.
+        sd: f64,
+    },
+    /// sd^2 exp(-2 sin^2(pi d / period) / length^2).
+    Periodic {
+        /// After which values repeat, in units of the points.
+        period: f64,
+        /// Over which values stay alike, as a fraction of about a period.
+        length: f64,
+        /// The standard deviation.
+        sd: f64,
+    },
+    /// sd^2 at one and the same point of a list, 0 between two, even if they coincide.
     White {
         /// The standard deviation.
         sd: f64,
     },
     /// The sum of two.
-    Sum(Box<Covariance>, Box<Covariance>),
+    Sum(Arc<(Covariance, Covariance)>),
     /// The product of two.
-    Product(Box<Covariance>, Box<Covariance>),
+    Product(Arc<(Covariance, Covariance)>),
 }
 
+use Covariance::*;
+
 impl Covariance {
-    /// Squared exponential.
-    ///
-    /// # Errors
-    /// Unless both parameters are positive and finite.
-    pub fn sq_exp(length: f64, sd: f64) -> Result<Self, ParamError> {
-        Ok(Covariance::SqExp { length: positive("sq_exp", "length", length)?, sd: positive("sq_exp", "sd", sd)? })
+    /// The squared exponential; fails unless both are positive and finite.
+    pub fn sq_exp(length: f64, sd: f64) -> Result<Covariance, ParamError> {
+        Ok(SqExp { length: positive("sq_exp", "length", length)?, sd: positive("sq_exp", "sd", sd)? })
     }
 
-    /// Matérn 3/2.
-    ///
-    /// # Errors
-    /// As [`Covariance::sq_exp`].
-    pub fn matern32(length: f64, sd: f64) -> Result<Self, ParamError> {
-        Ok(Covariance::Matern32 {
-            length: positive("matern32", "length", length)?,
-            sd: positive("matern32", "sd", sd)?,
-        })
+    /// Matérn's with nu = 3/2; fails unless both are positive and finite.
+    pub fn matern32(length: f64, sd: f64) -> Result<Covariance, ParamError> {
+        Ok(Matern32 { length: positive("matern32", "length", length)?, sd: positive("matern32", "sd", sd)? })
     }
 
-    /// Matérn 5/2.
-    ///
-    /// # Errors
-    /// As [`Covariance::sq_exp`].
-    pub fn matern52(length: f64, sd: f64) -> Result<Self, ParamError> {
-        Ok(Covariance::Matern52 {
-            length: positive("matern52", "length", length)?,
-            sd: positive("matern52", "sd", sd)?,
-        })
+    /// Matérn's with nu = 5/2; fails unless both are positive and finite.
+    pub fn matern52(length: f64, sd: f64) -> Result<Covariance, ParamError> {
+        Ok(Matern52 { length: positive("matern52", "length", length)?, sd: positive("matern52", "sd", sd)? })
     }
 
-    /// Periodic.
-    ///
-    /// # Errors
-    /// As [`Covariance::sq_exp`].
-    pub fn periodic(period: f64, length: f64, sd: f64) -> Result<Self, ParamError> {
-        Ok(Covariance::Periodic {
-            period: positive("periodic", "period", period)?,
-            length: positive("periodic", "length", length)?,
-            sd: positive("periodic", "sd", sd)?,
-        })
+    /// The periodic one (MacKay 1998); fails unless all are positive and finite.
+    pub fn periodic(period: f64, length: f64, sd: f64) -> Result<Covariance, ParamError> {
+        let period = positive("periodic", "period", period)?;
+        Ok(Periodic { period, length: positive("periodic", "length", length)?, sd: positive("periodic", "sd", sd)? })
     }
 
-    /// White noise.
-    ///
-    /// # Errors
-    /// As [`Covariance::sq_exp`].
-    pub fn white(sd: f64) -> Result<Self, ParamError> {
-        Ok(Covariance::White { sd: positive("white", "sd", sd)? })
+    /// Independent noise; fails unless the deviation is positive and finite.
+    pub fn white(sd: f64) -> Result<Covariance, ParamError> {
+        Ok(White { sd: positive("white", "sd", sd)? })
     }
 
-    /// The covariance of the values at two points; `same` tells whether they are one point of the list.
-    pub fn at(&self, x: f64, y: f64, same: bool) -> f64 {
-        let r = (x - y).abs();
+    /// The variance at a point.
+    pub fn variance(&self) -> f64 {
         match self {
-            Covariance::SqExp { length, sd } => {
-                let z = r / length;
-                sd * sd * libm::exp(-0.5 * z * z)
+            SqExp { sd, .. } | Matern32 { sd, .. } | Matern52 { sd, .. } | Periodic { sd, .. } | White { sd } => {
+                sd * sd
             }
-            Covariance::Matern32 { length, sd } => {
-                let z = 3f64.sqrt() * r / length;
-                sd * sd * (1.0 + z) * libm::exp(-z)
+            Sum(two) => two.0.variance() + two.1.variance(),
+            Product(two) => two.0.variance() * two.1.variance(),
+        }
+    }
+
+    /// The covariance of two different points of a list, at this distance.
+    pub fn at_distance(&self, d: f64) -> f64 {
+        match self {
+            SqExp { length, sd } => {
+                let r = d / length;
+                sd * sd * libm::exp(-0.5 * r * r)
             }
-            Covariance::Matern52 { length, sd } => {
-                let z = 5f64.sqrt() * r / length;
-                sd * sd * (1.0 + z + z * z / 3.0) * libm::exp(-z)
+            Matern32 { length, sd } => {
+                let r = (3f64.sqrt() * (d / length)).min(1e3);
+                sd * sd * (1.0 + r) * libm::exp(-r)
             }
-            Covariance::Periodic { period, length, sd } => {
-                let s = libm::sin(core::f64::consts::PI * r / period) / length;
+            Matern52 { length, sd } => {
+                let r = (5f64.sqrt() * (d / length)).min(1e3);
+                sd * sd * (1.0 + r * (1.0 + r / 3.0)) * libm::exp(-r)
+            }
+            Periodic { period, length, sd } => {
+                // The remainder is exact, so that far points keep their phase.
+                let s = libm::sin(core::f64::consts::PI * (libm::fmod(d, *period) / period)) / length;
                 sd * sd * libm::exp(-2.0 * s * s)
             }
-            Covariance::White { sd } => {
-                if same {
-                    sd * sd
-                } else {
-                    0.0
-                }
-            }
-            Covariance::Sum(a, b) => a.at(x, y, same) + b.at(x, y, same),
-            Covariance::Product(a, b) => a.at(x, y, same) * b.at(x, y, same),
+            White { .. } => 0.0,
+            Sum(two) => two.0.at_distance(d) + two.1.at_distance(d),
+            Product(two) => two.0.at_distance(d) * two.1.at_distance(d),
         }
     }
 
-    /// The variance at a point: the same everywhere.
-    pub fn variance(&self) -> f64 {
-        self.at(0.0, 0.0, true)
+    /// The covariance matrix of values at these points.
+    pub fn matrix(&self, at: &[f64]) -> DMatrix<f64> {
+        let packed = self.packed(at, 0.0);
+        DMatrix::from_fn(at.len(), at.len(), |i, j| {
+            let (i, j) = (i.max(j), i.min(j));
+            packed[i * (i + 1) / 2 + j]
+        })
     }
 
-    /// The covariance matrix of some points.
-    pub fn matrix(&self, points: &[f64]) -> DMatrix<f64> {
-        let n = points.len();
-        let mut m = DMatrix::zeros(n, n);
+    /// Its lower triangle by rows, with so much more on the diagonal. A distance that occurs between the first point and another
+    /// is evaluated once: on a regular grid nearly all do.
+    pub(super) fn packed(&self, at: &[f64], jitter: f64) -> Vec<f64> {
+        let n = at.len();
+        let mut packed = Vec::with_capacity(n * (n + 1) / 2);
+        let mut first: Vec<(f64, f64)> = Vec::with_capacity(n);
+        let diagonal = self.variance() + jitter;
         for i in 0..n {
-            for j in 0..=i {
-                let k = self.at(points[i], points[j], i == j);
-                m[(i, j)] = k;
-                m[(j, i)] = k;
+            for j in 0..i {
+                let d = (at[i] - at[j]).abs();
+                let k = match first.get(i - j) {
+                    Some((known, k)) if *known == d => *k,
+                    _ => self.at_distance(d),
+                };
+                if j == 0 {
+                    first.push((d, k));
+                }
+                packed.push(k);
+            }
+            if i == 0 {
+                first.push((0.0, f64::NAN));
+            }
+            packed.push(diagonal);
+        }
+        packed
+    }
+}
+
+impl fmt::Display for Covariance {
+    fn fmt(&self, f: &mut fmt::Formatter) -> fmt::Result {
+        match self {
+            SqExp { length, sd } => write!(f, "sq_exp(length = {length}, sd = {sd})"),
+            Matern32 { length, sd } => write!(f, "matern32(length = {length}, sd = {sd})"),
+            Matern52 { length, sd } => write!(f, "matern52(length = {length}, sd = {sd})"),
+            Periodic { period, length, sd } => write!(f, "periodic(period = {period}, length = {length}, sd = {sd})"),
+            White { sd } => write!(f, "white(sd = {sd})"),
+            Sum(two) => write!(f, "{} + {}", two.0, two.1),
+            Product(two) => {
+                for (i, part) in [&two.0, &two.1].into_iter().enumerate() {
+                    f.write_str(if i > 0 { " * " } else { "" })?;
+                    if matches!(part, Sum(_)) { write!(f, "({part})")? } else { write!(f, "{part}")? }
+                }
+                Ok(())
             }
         }
-        m
     }
 }
 
@@ -157,7 +179,7 @@ impl Add for Covariance {
     type Output = Covariance;
 
     fn add(self, other: Covariance) -> Covariance {
-        Covariance::Sum(Box::new(self), Box::new(other))
+        Sum(Arc::new((self, other)))
     }
 }
 
@@ -165,20 +187,6 @@ impl Mul for Covariance {
     type Output = Covariance;
 
     fn mul(self, other: Covariance) -> Covariance {
-        Covariance::Product(Box::new(self), Box::new(other))
-    }
-}
-
-impl fmt::Display for Covariance {
-    fn fmt(&self, f: &mut fmt::Formatter<'_>) -> fmt::Result {
-        match self {
-            Covariance::SqExp { length, sd } => write!(f, "sq_exp({length}, {sd})"),
-            Covariance::Matern32 { length, sd } => write!(f, "matern32({length}, {sd})"),
-            Covariance::Matern52 { length, sd } => write!(f, "matern52({length}, {sd})"),
-            Covariance::Periodic { period, length, sd } => write!(f, "periodic({period}, {length}, {sd})"),
-            Covariance::White { sd } => write!(f, "white({sd})"),
-            Covariance::Sum(a, b) => write!(f, "{a} + {b}"),
-            Covariance::Product(a, b) => write!(f, "({a}) * ({b})"),
-        }
+        Product(Arc::new((self, other)))
     }
 }

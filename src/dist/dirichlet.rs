@@ -1,38 +1,45 @@
-//! The Dirichlet distribution.
+//! The Dirichlet distribution: shares of 1.
 
-use super::beta::power_term;
+use super::draw::{ln_gamma_draw, x_log_y};
+use super::param::positive;
+use super::support::is_simplex;
 use super::{Datum, Distribution, Gradient, ParamError, Support};
 use crate::num::{digamma, ln_gamma, log_sum_exp};
 use crate::rng::Stream;
 
-/// dirichlet(alpha): shares of a whole
+/// `dirichlet(alpha)`; the density is by all shares but the last. A share of 0 is a pole (+inf) if its concentration is below 1
+/// and impossible if it is above; impossible wins.
 #[derive(Clone, Debug, PartialEq)]
 pub struct Dirichlet {
-    alpha: Vec<f64>,
-    norm: f64,
+    alpha: Box<[f64]>,
+    log_norm: f64,
 }
 
 impl Dirichlet {
-    /// One concentration for each share.
-    ///
-    /// # Errors
-    /// Unless there is at least one, and all are positive and finite.
-    pub fn new(alpha: &[f64]) -> Result<Self, ParamError> {
+    /// With these concentrations; fails unless there is one, and all are positive and have a finite sum.
+    pub fn new(alpha: &[f64]) -> Result<Dirichlet, ParamError> {
         if alpha.is_empty() {
-            return Err(ParamError::new("dirichlet", "alpha", "one number for each share", "[]"));
+            return Err(ParamError::new("dirichlet", "alpha", "none", "must have a number for each share"));
         }
         for a in alpha {
-            super::param::positive("dirichlet", "alpha", *a)?;
+            positive("dirichlet", "alpha", *a)?;
         }
-        let norm = ln_gamma(alpha.iter().sum()) - alpha.iter().map(|a| ln_gamma(*a)).sum::<f64>();
-        Ok(Dirichlet { alpha: alpha.to_vec(), norm })
+        let total = positive("dirichlet", "the sum of alpha", alpha.iter().sum())?;
+        let log_norm = ln_gamma(total) - alpha.iter().map(|a| ln_gamma(*a)).sum::<f64>();
+        Ok(Dirichlet { alpha: alpha.into(), log_norm: if alpha.len() == 1 { 0.0 } else { log_norm } })
     }
 
-    fn shares<'a>(&self, x: &'a Datum) -> Option<&'a [f64]> {
-        match x {
-            Datum::Vec(v) if v.len() == self.alpha.len() => Some(v),
-            _ => None,
+    fn score(&self, xs: &[f64]) -> f64 {
+        if !is_simplex(xs) {
+            return f64::NEG_INFINITY;
         }
+        if xs.iter().zip(&self.alpha).any(|(x, a)| *x == 0.0 && *a > 1.0) {
+            return f64::NEG_INFINITY;
+        }
+        if xs.len() == 1 {
+            return 0.0;
+        }
+        self.log_norm + xs.iter().zip(&self.alpha).map(|(x, a)| x_log_y(a - 1.0, *x)).sum::<f64>()
     }
 }
 
@@ -46,30 +53,29 @@ impl Distribution for Dirichlet {
     }
 
     fn sample(&self, rng: &mut Stream) -> Datum {
-        let logs: Vec<f64> = self.alpha.iter().map(|a| super::gamma::ln_gamma_draw(*a, rng)).collect();
-        let total = log_sum_exp(&logs);
-        Datum::Vec(logs.iter().map(|l| libm::exp(l - total).max(f64::MIN_POSITIVE)).collect())
+        let mut xs: Vec<f64> = self.alpha.iter().map(|a| ln_gamma_draw(*a, rng)).collect();
+        let total = log_sum_exp(&xs);
+        xs.iter_mut().for_each(|x| *x = libm::exp(*x - total).clamp(f64::MIN_POSITIVE, 1.0));
+        xs.into()
     }
 
-    /// By the first n - 1 shares; at a share of 0 with a concentration below 1 it is +inf.
     fn log_density(&self, x: &Datum) -> f64 {
-        let Some(v) = self.shares(x) else { return f64::NEG_INFINITY };
-        if !self.support().contains(x) {
-            return f64::NEG_INFINITY;
-        }
-        let d = self.norm + self.alpha.iter().zip(v).map(|(a, x)| power_term(*a, libm::log(*x))).sum::<f64>();
-        if d.is_nan() { f64::NEG_INFINITY } else { d }
+        x.with_numbers(self.alpha.len(), |xs| self.score(xs)).unwrap_or(f64::NEG_INFINITY)
     }
 
     fn gradient(&self, x: &Datum) -> Option<Gradient> {
-        let v = self.shares(x)?;
-        if v.iter().any(|x| *x <= 0.0) || !self.support().contains(x) {
+        if !self.log_density(x).is_finite() {
             return None;
         }
-        let total = digamma(self.alpha.iter().sum());
-        Some(Gradient {
-            x: self.alpha.iter().zip(v).map(|(a, x)| (a - 1.0) / x).collect(),
-            params: self.alpha.iter().zip(v).map(|(a, x)| libm::log(*x) - digamma(*a) + total).collect(),
+        x.with_numbers(self.alpha.len(), |xs| {
+            let total = digamma(self.alpha.iter().sum());
+            let pairs = || xs.iter().zip(&self.alpha);
+            let alone = xs.len() == 1;
+            let by_x = |(x, a): (&f64, &f64)| if *a == 1.0 || alone { 0.0 } else { (a - 1.0) / x };
+            let by_alpha = |(x, a): (&f64, &f64)| {
+                if alone { 0.0 } else { libm::log(x.max(f64::MIN_POSITIVE)) - digamma(*a) + total }
+            };
+            Gradient { x: pairs().map(by_x).collect(), params: pairs().map(by_alpha).collect() }
         })
     }
 }

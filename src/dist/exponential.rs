@@ -1,45 +1,49 @@
 //! The exponential distribution.
 
 use super::param::positive;
-use super::{Datum, Distribution, Gradient, ParamError, Support, number};
+use super::{ParamError, Scalar, Slope, Support};
 use crate::rng::Stream;
 
-/// exponential(rate)
+/// `exponential(rate)`.
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub struct Exponential {
     rate: f64,
+    log_rate: f64,
 }
 
 impl Exponential {
-    /// A rate: the mean is 1 / rate.
-    ///
-    /// # Errors
-    /// Unless it is positive and finite.
-    pub fn new(rate: f64) -> Result<Self, ParamError> {
-        Ok(Exponential { rate: positive("exponential", "rate", rate)? })
+    /// With this rate (the inverse of the mean); fails unless it is positive and finite.
+    pub fn new(rate: f64) -> Result<Exponential, ParamError> {
+        let rate = positive(Self::NAME, "rate", rate)?;
+        Ok(Exponential { rate, log_rate: libm::log(rate) })
     }
 }
 
-impl Distribution for Exponential {
-    fn name(&self) -> &'static str {
-        "exponential"
+impl Scalar for Exponential {
+    const NAME: &'static str = "exponential";
+
+    fn number_support(&self) -> Support {
+        Support::AtLeast { lo: 0.0 }
     }
 
-    fn support(&self) -> Support {
-        Support::NonNegative
+    fn draw(&self, rng: &mut Stream) -> f64 {
+        (-libm::log(rng.open_uniform()) / self.rate).min(f64::MAX)
     }
 
-    fn sample(&self, rng: &mut Stream) -> Datum {
-        Datum::Num((-libm::log(rng.open_uniform()) / self.rate).min(f64::MAX))
+    #[inline]
+    fn log_density_num(&self, x: f64) -> f64 {
+        if x >= 0.0 { self.log_rate - self.rate * x } else { f64::NEG_INFINITY }
     }
 
-    fn log_density(&self, x: &Datum) -> f64 {
-        let x = number(x);
-        if x >= 0.0 && x.is_finite() { libm::log(self.rate) - self.rate * x } else { f64::NEG_INFINITY }
+    fn slope(&self, x: f64) -> Slope {
+        Slope::new(-self.rate, [1.0 / self.rate - x])
     }
 
-    fn gradient(&self, x: &Datum) -> Option<Gradient> {
-        let inside = self.support().contains(x);
-        inside.then(|| Gradient { x: vec![-self.rate], params: vec![1.0 / self.rate - number(x)] })
+    fn number_mean(&self) -> Option<f64> {
+        Some(1.0 / self.rate)
+    }
+
+    fn number_sd(&self) -> Option<f64> {
+        Some(1.0 / self.rate)
     }
 }

@@ -1,22 +1,25 @@
-//! The Bernoulli distribution.
+//! A truth value.
 
 use super::param::probability;
 use super::{Datum, Distribution, Gradient, ParamError, Support};
 use crate::rng::Stream;
 
-/// flip(p): true with probability p
+/// `flip(p)`: true with probability `p`.
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub struct Flip {
     p: f64,
 }
 
 impl Flip {
-    /// The probability of `true`.
-    ///
-    /// # Errors
-    /// Unless it lies between 0 and 1.
-    pub fn new(p: f64) -> Result<Self, ParamError> {
+    /// With this probability of true; fails unless it is in [0, 1].
+    pub fn new(p: f64) -> Result<Flip, ParamError> {
         Ok(Flip { p: probability("flip", "p", p)? })
+    }
+
+    /// The log probability of a truth value.
+    #[inline]
+    pub fn log_probability(&self, x: bool) -> f64 {
+        if x { libm::log(self.p) } else { libm::log1p(-self.p) }
     }
 }
 
@@ -33,20 +36,27 @@ impl Distribution for Flip {
         Datum::Bool(rng.uniform() < self.p)
     }
 
+    #[inline]
     fn log_density(&self, x: &Datum) -> f64 {
         match x {
-            Datum::Bool(true) => libm::log(self.p),
-            Datum::Bool(false) => libm::log1p(-self.p),
+            Datum::Bool(x) => self.log_probability(*x),
             _ => f64::NEG_INFINITY,
         }
     }
 
     fn gradient(&self, x: &Datum) -> Option<Gradient> {
-        let by_p = match x {
-            Datum::Bool(true) => 1.0 / self.p,
-            Datum::Bool(false) => -1.0 / (1.0 - self.p),
-            _ => return None,
-        };
-        by_p.is_finite().then(|| Gradient { x: Vec::new(), params: vec![by_p] })
+        match x {
+            Datum::Bool(true) if self.p > 0.0 => Some(Gradient { x: Vec::new(), params: vec![1.0 / self.p] }),
+            Datum::Bool(false) if self.p < 1.0 => Some(Gradient { x: Vec::new(), params: vec![-1.0 / (1.0 - self.p)] }),
+            _ => None,
+        }
+    }
+
+    fn mean(&self) -> Option<f64> {
+        Some(self.p)
+    }
+
+    fn sd(&self) -> Option<f64> {
+        Some((self.p * (1.0 - self.p)).sqrt())
     }
 }

@@ -1,80 +1,51 @@
-//! A Gaussian process at some points, kept as the white noise behind it: value = mean + L z with L L^T = K.
-//!
-//! Whitened, the noise keeps its meaning when length or spread change; the values follow. `centred` keeps the values
-//! instead, which suits data that say much about each of them (Papaspiliopoulos et al. 2007).
+//! A Gaussian process at given points.
 
-use super::mv_normal::standard_log_density;
-use super::{Covariance, Datum, Distribution, Gradient, MvNormal, ParamError, Support};
+use super::factor::Factor;
+use super::mv_normal::{draw, score, slopes, standard_score, whiten};
+use super::param::finite;
+use super::{Covariance, Datum, Distribution, Gradient, ParamError, Support};
 use crate::rng::Stream;
 
-/// gp(mean, cov, at)
+/// What is added to the diagonal of the covariance matrix, as a share of the variance: part of the model.
+const JITTER: f64 = 1e-6;
+
+/// `gp(mean, cov, at)`.
+///
+/// Its choice is stored as white noise z ~ N(0, I), with value = mean + chol(K + 1e-6 variance I) z, so that the values follow
+/// when a parameter of the covariance moves; a centred one stores the values. Gradients are by the mean only.
 #[derive(Clone, Debug, PartialEq)]
 pub struct Gp {
-    normal: MvNormal,
-    n: usize,
+    mean: Vec<f64>,
+    factor: Factor,
     centred: bool,
 }
 
-/// What is added to the diagonal of the covariance matrix, as a fraction of the variance.
-const JITTER: f64 = 1e-6;
-/// At most this many points: the factor costs their cube.
-const MOST: usize = 4000;
-
 impl Gp {
-    /// The values of a process with this mean and covariance function at some points.
-    ///
-    /// # Errors
-    /// If mean and points differ in number, are not finite, there are more than 4000, or the covariance matrix cannot be
-    /// factored.
-    pub fn new(mean: Vec<f64>, cov: &Covariance, at: &[f64], centred: bool) -> Result<Self, ParamError> {
+    /// With these means and this covariance function at these points; fails unless there are as many means as points, all
+    /// finite, and the covariance matrix has a Cholesky factor.
+    pub fn new(mean: Vec<f64>, cov: &Covariance, at: &[f64], centred: bool) -> Result<Gp, ParamError> {
         if mean.len() != at.len() {
-            return Err(ParamError::new("gp", "mean", "as long as the points", mean.len()));
+            let value = format!("{} for {}", mean.len(), at.len());
+            return Err(ParamError::new("gp", "mean", value, "must have a number for each point"));
         }
-        if at.len() > MOST {
-            return Err(ParamError::new("gp", "at", "at most 4000 points", at.len()));
+        for m in &mean {
+            finite("gp", "mean", *m)?;
         }
-        if let Some(x) = at.iter().find(|x| !x.is_finite()) {
-            return Err(ParamError::new("gp", "at", "finite", x));
+        for x in at {
+            finite("gp", "at", *x)?;
         }
-        if let Some(x) = mean.iter().find(|x| !x.is_finite()) {
-            return Err(ParamError::new("gp", "mean", "finite", x));
-        }
-        let mut k = cov.matrix(at);
-        let jitter = JITTER * cov.variance();
-        for i in 0..at.len() {
-            k[(i, i)] += jitter;
-        }
-        let singular = || ParamError::new("gp", "cov", "such that its matrix can be factored", cov);
-        let chol = k.cholesky().ok_or_else(singular)?.l();
-        Ok(Gp { normal: MvNormal::from_chol(&mean, &chol).map_err(|_| singular())?, n: at.len(), centred })
+        let packed = cov.packed(at, JITTER * cov.variance());
+        let singular = || {
+            let value = format!("{cov} at {} points", at.len());
+            ParamError::new("gp", "cov", value, "must make a positive definite matrix")
+        };
+        let factor = Factor::new(at.len(), packed).ok_or_else(singular)?;
+        Ok(Gp { mean, factor, centred })
     }
 
-    /// Whether values are kept instead of the noise behind them.
-    pub fn is_centred(&self) -> bool {
-        self.centred
-    }
-
-    /// White noise.
-    pub fn sample_noise(&self, rng: &mut Stream) -> Datum {
-        Datum::Vec((0..self.n).map(|_| rng.standard_normal()).collect())
-    }
-
-    /// The log density of white noise.
-    pub fn log_density_noise(&self, z: &Datum) -> f64 {
-        match z {
-            Datum::Vec(z) if z.len() == self.n => standard_log_density(z),
-            _ => f64::NEG_INFINITY,
-        }
-    }
-
-    /// The values of white noise.
-    pub fn colour_vec(&self, z: &[f64]) -> Option<Vec<f64>> {
-        self.normal.colour_vec(z)
-    }
-
-    /// The noise behind values.
-    pub fn whiten_vec(&self, x: &[f64]) -> Option<Vec<f64>> {
-        self.normal.whiten_vec(x)
+    /// The same process, storing values.
+    pub fn to_centred(&self) -> Gp {
+        Gp { centred: true, ..self.clone() }
     }
 }
 
@@ -84,18 +55,79 @@ impl Distribution for Gp {
     }
 
     fn support(&self) -> Support {
-        Support::Vector(self.n)
+        Support::Vector(self.mean.len())
     }
 
     fn sample(&self, rng: &mut Stream) -> Datum {
-        self.normal.sample(rng)
+        draw(&self.factor, &self.mean, rng)
     }
 
     fn log_density(&self, x: &Datum) -> f64 {
-        self.normal.log_density(x)
+        score(&self.factor, &self.mean, x)
     }
 
     fn gradient(&self, x: &Datum) -> Option<Gradient> {
-        self.normal.gradient(x)
+        slopes(&self.factor, &self.mean, x)
+    }
+
+    fn is_gaussian(&self) -> bool {
+        true
+    }
+
+    fn whiten(&self, x: &Datum) -> Option<Vec<f64>> {
+        whiten(&self.factor, &self.mean, x)
+    }
+
+    fn colour(&self, z: &[f64]) -> Option<Datum> {
+        (z.len() == self.mean.len()).then(|| self.factor.colour(&self.mean, z).into())
+    }
+
+    fn is_stored_whitened(&self) -> bool {
+        !self.centred
+    }
+
+    fn sample_stored(&self, rng: &mut Stream) -> Datum {
+        if self.centred {
+            return self.sample(rng);
+        }
+        self.mean.iter().map(|_| rng.standard_normal()).collect::<Vec<_>>().into()
+    }
+
+    fn log_density_stored(&self, s: &Datum) -> f64 {
+        if self.centred {
+            return self.log_density(s);
+        }
+        let score = s.with_numbers(self.mean.len(), standard_score);
+        score.filter(|s| !s.is_nan()).unwrap_or(f64::NEG_INFINITY)
+    }
+
+    fn gradient_stored(&self, s: &Datum) -> Option<Gradient> {
+        if self.centred {
+            return self.gradient(s);
+        }
+        if !self.log_density_stored(s).is_finite() {
+            return None;
+        }
+        let x = s.with_numbers(self.mean.len(), |z| z.iter().map(|z| -z).collect())?;
+        Some(Gradient { x, params: vec![0.0; self.mean.len()] })
+    }
+
+    /// Noise of another length has no value: what there is of it is taken, the rest is 0.
+    fn realise(&self, s: &Datum) -> Datum {
+        if self.centred {
+            return s.clone();
+        }
+        match s.with_numbers(self.mean.len(), |z| self.factor.colour(&self.mean, z)) {
+            Some(x) => x.into(),
+            None => {
+                let number = |i| s.element(i).and_then(|x| x.num()).unwrap_or(0.0);
+                let z: Vec<f64> = (0..self.mean.len()).map(number).collect();
+                self.factor.colour(&self.mean, &z).into()
+            }
+        }
+    }
+
+    fn unrealise(&self, value: &Datum) -> Option<Datum> {
+        if self.centred { Some(value.clone()) } else { self.whiten(value).map(Datum::from) }
     }
 }

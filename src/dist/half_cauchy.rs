@@ -1,58 +1,64 @@
-//! The half-Cauchy distribution.
+//! The upper half of a Cauchy distribution.
 
+use super::draw::{log1p_square, standard};
 use super::param::{finite, positive};
-use super::{Datum, Distribution, Gradient, ParamError, Support, number};
+use super::{ParamError, Scalar, Slope, Support};
 use crate::rng::Stream;
-use core::f64::consts::FRAC_PI_2;
 
-/// half_cauchy(location, scale): the upper half of a Cauchy distribution
+/// `half_cauchy(location, scale)`, on [location, inf).
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub struct HalfCauchy {
     location: f64,
     scale: f64,
+    log_norm: f64,
 }
 
 impl HalfCauchy {
-    /// Where it begins, and its median's distance from there.
-    ///
-    /// # Errors
-    /// Unless `location` is finite and `scale` positive and finite.
-    pub fn new(location: f64, scale: f64) -> Result<Self, ParamError> {
-        Ok(HalfCauchy {
-            location: finite("half_cauchy", "location", location)?,
-            scale: positive("half_cauchy", "scale", scale)?,
-        })
+    /// From this location on, with this median distance from it; fails unless the location is finite and the scale positive
+    /// and finite.
+    pub fn new(location: f64, scale: f64) -> Result<HalfCauchy, ParamError> {
+        let (location, scale) = (finite(Self::NAME, "location", location)?, positive(Self::NAME, "scale", scale)?);
+        Ok(HalfCauchy { location, scale, log_norm: libm::log(core::f64::consts::FRAC_2_PI) - libm::log(scale) })
     }
 }
 
-impl Distribution for HalfCauchy {
-    fn name(&self) -> &'static str {
-        "half_cauchy"
+impl Scalar for HalfCauchy {
+    const NAME: &'static str = "half_cauchy";
+
+    fn number_support(&self) -> Support {
+        Support::AtLeast { lo: self.location }
     }
 
-    fn support(&self) -> Support {
-        Support::Interval { lo: self.location, hi: f64::INFINITY }
+    fn draw(&self, rng: &mut Stream) -> f64 {
+        let x = self.location + self.scale * libm::tan(core::f64::consts::FRAC_PI_2 * rng.open_uniform());
+        x.clamp(self.location, f64::MAX)
     }
 
-    fn sample(&self, rng: &mut Stream) -> Datum {
-        let x = self.location + self.scale * libm::tan(FRAC_PI_2 * rng.open_uniform());
-        Datum::Num(x.clamp(self.location, f64::MAX))
-    }
-
-    fn log_density(&self, x: &Datum) -> f64 {
-        let x = number(x);
-        if !(x >= self.location && x.is_finite()) {
-            return f64::NEG_INFINITY;
+    #[inline]
+    fn log_density_num(&self, x: f64) -> f64 {
+        if x >= self.location {
+            self.log_norm - log1p_square(standard(x, self.location, self.scale))
+        } else {
+            f64::NEG_INFINITY
         }
-        // hypot keeps 1 + z^2 from overflowing far out.
-        let z = (x - self.location) / self.scale;
-        -libm::log(FRAC_PI_2) - libm::log(self.scale) - 2.0 * libm::log(libm::hypot(1.0, z))
     }
 
-    fn gradient(&self, x: &Datum) -> Option<Gradient> {
-        let z = (number(x) - self.location) / self.scale;
-        let slope = -2.0 * z / (1.0 + z * z) / self.scale;
-        let inside = self.support().contains(x) && slope.is_finite();
-        inside.then(|| Gradient { x: vec![slope], params: vec![-slope, -1.0 / self.scale - slope * z] })
+    fn slope(&self, x: f64) -> Slope {
+        let z = standard(x, self.location, self.scale);
+        // 2 z / (1 + z^2) and z times it, with no overflow.
+        let (once, twice) = if z < 1.0 {
+            (2.0 * z / (1.0 + z * z), 2.0 * z * z / (1.0 + z * z))
+        } else {
+            (2.0 / (z + 1.0 / z), 2.0 / (1.0 + 1.0 / z / z))
+        };
+        Slope::new(-once / self.scale, [once / self.scale, (twice - 1.0) / self.scale])
+    }
+
+    fn number_mean(&self) -> Option<f64> {
+        None
+    }
+
+    fn number_sd(&self) -> Option<f64> {
+        None
     }
 }

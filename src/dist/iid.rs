@@ -1,38 +1,43 @@
-//! Independent draws from one distribution.
+//! Independent elements of one distribution.
 
-use super::{Datum, Dist, Distribution, Gradient, ParamError, Support};
+use super::{Datum, Dist, Distribution, Gradient, ParamError, Support, product};
 use crate::rng::Stream;
 
-/// iid(d, n)
+/// `iid(d, n)`. In the language its elements are choices with addresses of their own.
+///
+/// Elements are stored as values: a Gaussian process becomes a centred one. Gradients by parameters are summed over elements.
 #[derive(Clone, Debug)]
 pub struct Iid {
-    element: Dist,
+    one: Dist,
     n: usize,
 }
 
-/// At most this many draws.
-const MOST: usize = 100_000_000;
-
 impl Iid {
-    /// A distribution and how many.
-    ///
-    /// # Errors
-    /// If there are more than a hundred million.
-    pub fn new(element: Dist, n: usize) -> Result<Self, ParamError> {
-        if n > MOST {
-            return Err(ParamError::new("iid", "n", "at most 100000000", n));
+    /// So many elements of a distribution; fails for more than 2^32 - 2, which have no addresses.
+    pub fn new(one: Dist, n: usize) -> Result<Iid, ParamError> {
+        if n >= u32::MAX as usize {
+            return Err(ParamError::new("iid", "n", n, "must be below 2^32 - 1"));
         }
-        Ok(Iid { element, n })
+        Ok(Iid { one: one.centred(), n })
     }
 
-    /// The distribution of one.
-    pub fn element(&self) -> &Dist {
-        &self.element
-    }
-
-    /// How many.
-    pub fn count(&self) -> usize {
+    /// How many elements there are.
+    pub fn len(&self) -> usize {
         self.n
+    }
+
+    /// Whether there are none.
+    pub fn is_empty(&self) -> bool {
+        self.n == 0
+    }
+
+    /// An element's distribution.
+    pub fn one(&self) -> &Dist {
+        &self.one
+    }
+
+    fn parts(&self) -> impl Iterator<Item = &Dist> {
+        std::iter::repeat_n(&self.one, self.n)
     }
 }
 
@@ -42,31 +47,37 @@ impl Distribution for Iid {
     }
 
     fn support(&self) -> Support {
-        Support::Repeat(Box::new(self.element.support()), self.n)
+        Support::Product(Box::new(self.one.support()), self.n)
     }
 
     fn sample(&self, rng: &mut Stream) -> Datum {
-        Datum::from_elements((0..self.n).map(|_| self.element.sample(rng)).collect())
+        Datum::from_elements(self.parts().map(|p| p.sample(rng)).collect())
     }
 
     fn log_density(&self, x: &Datum) -> f64 {
-        if x.len() != Some(self.n) {
-            return f64::NEG_INFINITY;
-        }
-        (0..self.n).map(|i| x.element(i).map_or(f64::NEG_INFINITY, |e| self.element.log_density(&e))).sum()
+        product::score(self.parts(), self.n, x)
     }
 
     fn gradient(&self, x: &Datum) -> Option<Gradient> {
-        let mut all = Gradient { x: Vec::new(), params: Vec::new() };
-        for i in 0..self.n {
-            let g = self.element.gradient(&x.element(i)?)?;
-            all.x.extend(g.x);
-            if all.params.is_empty() {
-                all.params = g.params;
-            } else {
-                all.params.iter_mut().zip(g.params).for_each(|(a, b)| *a += b);
-            }
-        }
-        Some(all)
+        product::slopes(self.parts(), self.n, x, |all, one| {
+            all.resize(one.len(), 0.0);
+            all.iter_mut().zip(one).for_each(|(a, b)| *a += b);
+        })
+    }
+
+    fn is_gaussian(&self) -> bool {
+        self.one.is_gaussian()
+    }
+
+    fn whiten(&self, x: &Datum) -> Option<Vec<f64>> {
+        product::whiten(self.parts(), self.n, x)
+    }
+
+    fn colour(&self, z: &[f64]) -> Option<Datum> {
+        product::colour(self.parts(), self.n, z)
+    }
+
+    fn is_scalar(&self) -> bool {
+        false
     }
 }

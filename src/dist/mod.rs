@@ -1,7 +1,7 @@
-//! Distributions: what a random choice draws from and an observation scores with.
+//! Probability distributions: what they draw, how they score it, the spaces their values live in.
 //!
-//! Everything is in log space, defined at the edges of the support and in the tails, and never NaN: a density is -inf off
-//! the support. Parameters are checked when a distribution is made. Knows nothing of programs or traces.
+//! Nothing here knows of programs, traces or images. Parameters are checked when a distribution is made, so that everything after
+//! that is total: a log density is -inf off the support (a value of the wrong kind included) and never NaN.
 
 mod beta;
 mod binomial;
@@ -9,8 +9,12 @@ mod categorical;
 mod covariance;
 mod datum;
 mod dirichlet;
-mod dispatch;
+#[allow(clippy::module_inception)]
+mod dist;
+mod distribution;
+mod draw;
 mod exponential;
+mod factor;
 mod families;
 mod flip;
 mod gamma;
@@ -24,6 +28,7 @@ mod normal;
 mod param;
 mod poisson;
 mod product;
+mod scalar;
 mod student_t;
 mod support;
 mod transform;
@@ -36,7 +41,8 @@ pub use categorical::Categorical;
 pub use covariance::Covariance;
 pub use datum::Datum;
 pub use dirichlet::Dirichlet;
-pub use dispatch::Dist;
+pub use dist::Dist;
+pub use distribution::{Distribution, Gradient};
 pub use exponential::Exponential;
 pub use families::{FAMILIES, Family, ParamDoc};
 pub use flip::Flip;
@@ -51,41 +57,11 @@ pub use normal::Normal;
 pub use param::ParamError;
 pub use poisson::Poisson;
 pub use product::Product;
+pub use scalar::{Scalar, Slope};
 pub use student_t::StudentT;
-pub use support::Support;
+pub use support::{MAX_ENUMERATED, Support};
 pub use uniform::Uniform;
 pub use uniform_discrete::UniformDiscrete;
 
-use crate::rng::Stream;
-use std::fmt;
-
-/// The derivative of a log density.
-#[derive(Clone, Debug, PartialEq)]
-pub struct Gradient {
-    /// By the drawn value, flattened; empty if it is discrete.
-    pub x: Vec<f64>,
-    /// By each parameter, in the order of the constructor, flattened.
-    pub params: Vec<f64>,
-}
-
-/// A distribution: sampler, log density, support, gradient.
-pub trait Distribution: fmt::Debug + Send + Sync {
-    /// What programs call it.
-    fn name(&self) -> &'static str;
-    /// Where its values lie.
-    fn support(&self) -> Support;
-    /// Draws a value.
-    fn sample(&self, rng: &mut Stream) -> Datum;
-    /// The log density or log probability; -inf off the support, for NaN, and for a datum of another kind.
-    fn log_density(&self, x: &Datum) -> f64;
-    /// The derivative of the log density at a point inside the support; `None` outside.
-    fn gradient(&self, x: &Datum) -> Option<Gradient>;
-}
-
-/// The number in a datum, NaN for anything else: a density of NaN is -inf.
-fn number(x: &Datum) -> f64 {
-    match x {
-        Datum::Num(x) => *x,
-        _ => f64::NAN,
-    }
-}
+#[cfg(test)]
+mod tests;

@@ -1,82 +1,83 @@
-//! Student's t distribution.
+//! Student's t distribution, with a location and a scale.
 
+use super::draw::{ln_gamma_draw, log1p_square, standard};
 use super::param::{finite, positive};
-use super::{Datum, Distribution, Gradient, ParamError, Support, number};
-use crate::num::{digamma, ln_gamma};
+use super::{ParamError, Scalar, Slope, Support};
+use crate::num::{digamma, ln_beta};
 use crate::rng::Stream;
 
-/// student_t(df, location, scale)
+/// `student_t(df, location, scale)`.
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub struct StudentT {
     df: f64,
     location: f64,
     scale: f64,
-    norm: f64,
+    log_norm: f64,
 }
 
 impl StudentT {
-    /// Degrees of freedom, location and scale.
-    ///
-    /// # Errors
-    /// Unless `df` and `scale` are positive and finite and `location` is finite.
-    pub fn new(df: f64, location: f64, scale: f64) -> Result<Self, ParamError> {
-        let df = positive("student_t", "df", df)?;
-        let location = finite("student_t", "location", location)?;
-        let scale = positive("student_t", "scale", scale)?;
-        let norm = ln_ratio(df) - 0.5 * libm::log(df) - 0.5 * libm::log(core::f64::consts::PI) - libm::log(scale);
-        Ok(StudentT { df, location, scale, norm })
+    /// With these degrees of freedom, location and scale; fails unless the location is finite and the others positive and
+    /// finite.
+    pub fn new(df: f64, location: f64, scale: f64) -> Result<StudentT, ParamError> {
+        let df = positive(Self::NAME, "df", df)?;
+        let (location, scale) = (finite(Self::NAME, "location", location)?, positive(Self::NAME, "scale", scale)?);
+        let log_norm = -ln_beta(0.5 * df, 0.5) - 0.5 * libm::log(df) - libm::log(scale);
+        Ok(StudentT { df, location, scale, log_norm })
     }
 }
 
-/// ln Gamma((v + 1) / 2) - ln Gamma(v / 2); by a series where the difference would cancel.
-fn ln_ratio(v: f64) -> f64 {
-    if v < 1e6 {
-        return ln_gamma(0.5 * (v + 1.0)) - ln_gamma(0.5 * v);
+impl StudentT {
+    /// ln(1 + z^2 / df).
+    #[inline]
+    fn log_tail(&self, z: f64) -> f64 {
+        let t = z / self.df.sqrt();
+        if t.is_finite() { log1p_square(t) } else { 2.0 * libm::log(z.abs()) - libm::log(self.df) }
     }
-    0.5 * libm::log(0.5 * v) - 0.25 / v
 }
 
-/// ln(1 + z^2 / v), also where z^2 overflows.
-fn ln_tail(z: f64, v: f64) -> f64 {
-    let z = z.abs();
-    if z < 1e150 { libm::log1p(z * z / v) } else { 2.0 * libm::log(z) - libm::log(v) }
-}
+impl Scalar for StudentT {
+    const NAME: &'static str = "student_t";
 
-impl Distribution for StudentT {
-    fn name(&self) -> &'static str {
-        "student_t"
-    }
-
-    fn support(&self) -> Support {
+    fn number_support(&self) -> Support {
         Support::Real
     }
 
-    fn sample(&self, rng: &mut Stream) -> Datum {
-        // z / sqrt(chi2 / df), the chi-square in log space for small df.
+    fn draw(&self, rng: &mut Stream) -> f64 {
         let z = rng.standard_normal();
-        let ln_chi2 = super::gamma::ln_gamma_draw(0.5 * self.df, rng) + core::f64::consts::LN_2;
-        let t = z * libm::exp(0.5 * (libm::log(self.df) - ln_chi2).min(1400.0));
-        Datum::Num((self.location + self.scale * t).clamp(-f64::MAX, f64::MAX))
+        let half = 0.5 * self.df;
+        let spread = libm::exp(0.5 * (libm::log(half) - ln_gamma_draw(half, rng))).min(f64::MAX);
+        (self.location + self.scale * (z * spread)).clamp(f64::MIN, f64::MAX)
     }
 
-    fn log_density(&self, x: &Datum) -> f64 {
-        let x = number(x);
+    #[inline]
+    fn log_density_num(&self, x: f64) -> f64 {
+        let z = standard(x, self.location, self.scale);
         if !x.is_finite() {
             return f64::NEG_INFINITY;
         }
-        let z = (x - self.location) / self.scale;
-        self.norm - 0.5 * (self.df + 1.0) * ln_tail(z, self.df)
+        self.log_norm - 0.5 * (self.df + 1.0) * self.log_tail(z)
     }
 
-    fn gradient(&self, x: &Datum) -> Option<Gradient> {
-        let z = (number(x) - self.location) / self.scale;
-        let (v, q) = (self.df, z * z);
-        if !q.is_finite() {
-            return None;
-        }
-        let slope = -(v + 1.0) * z / (v + q) / self.scale;
-        let by_df = 0.5
-            * (digamma(0.5 * (v + 1.0)) - digamma(0.5 * v) - 1.0 / v - ln_tail(z, v) + (v + 1.0) * q / (v * (v + q)));
-        Some(Gradient { x: vec![slope], params: vec![by_df, -slope, -1.0 / self.scale - slope * z] })
+    fn slope(&self, x: f64) -> Slope {
+        let (df, z) = (self.df, standard(x, self.location, self.scale));
+        let t = z / df.sqrt();
+        // (df + 1) z / (df + z^2), and z times it.
+        let (once, twice) = if t.abs() < 1.0 {
+            let weight = (df + 1.0) / (df * (1.0 + t * t));
+            (weight * z, weight * z * z)
+        } else {
+            ((df + 1.0) / (z + df / z), (df + 1.0) / (1.0 + df / z / z))
+        };
+        let norm = 0.5 * (digamma(0.5 * (df + 1.0)) - digamma(0.5 * df) - 1.0 / df);
+        let by_df = norm - 0.5 * self.log_tail(z) + 0.5 * twice / df;
+        Slope::new(-once / self.scale, [by_df, once / self.scale, (twice - 1.0) / self.scale])
+    }
+
+    fn number_mean(&self) -> Option<f64> {
+        (self.df > 1.0).then_some(self.location)
+    }
+
+    fn number_sd(&self) -> Option<f64> {
+        (self.df > 2.0).then(|| self.scale * (self.df / (self.df - 2.0)).sqrt())
     }
 }

@@ -1,117 +1,144 @@
-//! Where the values of a distribution lie.
+//! The spaces that values live in. How they map to unconstrained space is in `transform.rs`.
 
 use super::Datum;
+use std::sync::Arc;
 
-/// The set of values of a distribution.
+/// Up to this many values are enumerated; a larger set counts as infinite.
+pub const MAX_ENUMERATED: i64 = 10_000;
+
+/// How far from 1 the sum of the shares of a simplex may be.
+const SIMPLEX_TOLERANCE: f64 = 1e-8;
+
+/// The space of a distribution's values.
 #[derive(Clone, Debug, PartialEq)]
 pub enum Support {
-    /// Any number.
+    /// All finite numbers.
     Real,
-    /// (0, inf)
+    /// Above 0.
     Positive,
-    /// [0, inf)
-    NonNegative,
-    /// Between two numbers; `hi` may be infinite.
-    Interval {
-        /// The lower end.
+    /// At or above a bound.
+    AtLeast {
+        /// The bound.
         lo: f64,
-        /// The upper end.
+    },
+    /// Between two bounds, both included.
+    Interval {
+        /// The lower bound.
+        lo: f64,
+        /// The upper bound.
         hi: f64,
     },
-    /// `true` and `false`.
+    /// Truth values.
     Boolean,
-    /// Whole numbers, both ends included; without `hi`, unbounded above.
+    /// Integers from `lo`, up to `hi` if there is one.
     Integers {
         /// The least.
         lo: i64,
         /// The greatest.
         hi: Option<i64>,
     },
-    /// Vectors of this length of positive numbers that sum to 1.
+    /// Shares that sum to 1.
     Simplex(usize),
-    /// Vectors of this length.
+    /// Vectors of so many finite numbers.
     Vector(usize),
-    /// This many independent values of the same kind.
-    Repeat(Box<Support>, usize),
-    /// Independent values of various kinds.
-    Product(std::sync::Arc<[Support]>),
+    /// So many values of one space.
+    Product(Box<Support>, usize),
+    /// One value of each of these spaces.
+    Each(Arc<[Support]>),
 }
 
-/// More values than this are not enumerated.
-const ENUMERATED: i64 = 10_000;
-
 impl Support {
-    /// Whether values are counted rather than measured.
+    /// Whether its values are single numbers.
+    pub fn is_number(&self) -> bool {
+        use Support::*;
+        matches!(self, Real | Positive | AtLeast { .. } | Interval { .. } | Integers { .. })
+    }
+
+    /// Whether its values can be counted. A product is discrete if all of its parts are.
     pub fn is_discrete(&self) -> bool {
         match self {
             Support::Boolean | Support::Integers { .. } => true,
-            Support::Repeat(s, _) => s.is_discrete(),
-            Support::Product(s) => s.iter().all(Support::is_discrete),
+            Support::Product(one, _) => one.is_discrete(),
+            Support::Each(all) => all.iter().all(Support::is_discrete),
             _ => false,
         }
     }
 
-    /// Whether there are finitely many values, few enough to go through.
+    /// Whether [`Support::finite_values`] has an answer.
     pub fn is_finite(&self) -> bool {
         match self {
             Support::Boolean => true,
-            Support::Integers { lo, hi: Some(hi) } => hi.checked_sub(*lo).is_some_and(|n| n < ENUMERATED),
+            Support::Integers { lo, hi: Some(hi) } => hi.saturating_sub(*lo) < MAX_ENUMERATED,
             _ => false,
         }
     }
 
-    /// All values in order, if [`is_finite`](Support::is_finite).
+    /// All values in ascending order, if they are truth values or at most [`MAX_ENUMERATED`] integers.
     pub fn finite_values(&self) -> Option<Vec<Datum>> {
         match self {
             Support::Boolean => Some(vec![Datum::Bool(false), Datum::Bool(true)]),
             Support::Integers { lo, hi: Some(hi) } if self.is_finite() => {
-                Some((*lo..=*hi).map(|k| Datum::Num(k as f64)).collect())
+                Some((*lo..=*hi).map(|i| Datum::Num(i as f64)).collect())
             }
             _ => None,
         }
     }
 
-    /// Whether a value has the right kind and shape, wherever it lies.
+    /// Whether a value is of the right kind and size, be it inside or not.
     pub fn fits(&self, x: &Datum) -> bool {
-        match (self, x) {
-            (Support::Boolean, Datum::Bool(_)) => true,
-            (Support::Boolean, _) => false,
-            (Support::Simplex(n) | Support::Vector(n), Datum::Vec(v)) => v.len() == *n,
-            (Support::Simplex(_) | Support::Vector(_), _) => false,
-            (Support::Repeat(s, n), x) => each(x, *n, |_, e| s.fits(e)),
-            (Support::Product(s), x) => each(x, s.len(), |i, e| s[i].fits(e)),
-            (_, Datum::Num(_)) => true,
+        match self {
+            Support::Boolean => matches!(x, Datum::Bool(_)),
+            Support::Simplex(n) | Support::Vector(n) => x.with_numbers(*n, |_| ()).is_some(),
+            Support::Product(one, n) => match x {
+                Datum::Vec(xs) => xs.len() == *n && one.is_number(),
+                Datum::List(xs) => xs.len() == *n && xs.iter().all(|x| one.fits(x)),
+                _ => *n == 0 && x.len() == Some(0),
+            },
+            Support::Each(all) => match x {
+                Datum::Vec(xs) => xs.len() == all.len() && all.iter().all(Support::is_number),
+                Datum::List(xs) => xs.len() == all.len() && all.iter().zip(xs.iter()).all(|(s, x)| s.fits(x)),
+                _ => false,
+            },
+            _ => matches!(x, Datum::Num(_)),
+        }
+    }
+
+    /// Whether a number is inside.
+    #[inline]
+    pub fn contains_num(&self, x: f64) -> bool {
+        match self {
+            Support::Real => x.is_finite(),
+            Support::Positive => x > 0.0 && x.is_finite(),
+            Support::AtLeast { lo } => x >= *lo && x.is_finite(),
+            Support::Interval { lo, hi } => (*lo..=*hi).contains(&x),
+            Support::Integers { lo, hi } => {
+                x.is_finite() && x == libm::trunc(x) && x >= *lo as f64 && hi.is_none_or(|hi| x <= hi as f64)
+            }
             _ => false,
         }
     }
 
-    /// Whether a value lies in the support.
+    /// Whether a value is inside.
     pub fn contains(&self, x: &Datum) -> bool {
         match (self, x) {
-            (Support::Real, Datum::Num(x)) => x.is_finite(),
-            (Support::Positive, Datum::Num(x)) => *x > 0.0 && x.is_finite(),
-            (Support::NonNegative, Datum::Num(x)) => *x >= 0.0 && x.is_finite(),
-            (Support::Interval { lo, hi }, Datum::Num(x)) => x.is_finite() && *lo <= *x && *x <= *hi,
+            (_, Datum::Num(x)) => self.contains_num(*x),
             (Support::Boolean, Datum::Bool(_)) => true,
-            (Support::Integers { lo, hi }, Datum::Num(x)) => {
-                *x == libm::trunc(*x) && *x >= *lo as f64 && hi.is_none_or(|h| *x <= h as f64) && x.is_finite()
+            (Support::Simplex(n), _) => x.with_numbers(*n, is_simplex).unwrap_or(false),
+            (Support::Vector(n), _) => x.with_numbers(*n, |xs| xs.iter().all(|x| x.is_finite())).unwrap_or(false),
+            (Support::Product(one, n), Datum::Vec(xs)) => xs.len() == *n && xs.iter().all(|x| one.contains_num(*x)),
+            (Support::Product(one, n), Datum::List(xs)) => xs.len() == *n && xs.iter().all(|x| one.contains(x)),
+            (Support::Each(all), Datum::Vec(xs)) => {
+                xs.len() == all.len() && all.iter().zip(xs.iter()).all(|(s, x)| s.contains_num(*x))
             }
-            (Support::Simplex(n), Datum::Vec(v)) => {
-                v.len() == *n && v.iter().all(|x| *x >= 0.0) && (v.iter().sum::<f64>() - 1.0).abs() < 1e-9
+            (Support::Each(all), Datum::List(xs)) => {
+                xs.len() == all.len() && all.iter().zip(xs.iter()).all(|(s, x)| s.contains(x))
             }
-            (Support::Vector(n), Datum::Vec(v)) => v.len() == *n && v.iter().all(|x| x.is_finite()),
-            (Support::Repeat(s, n), x) => each(x, *n, |_, e| s.contains(e)),
-            (Support::Product(s), x) => each(x, s.len(), |i, e| s[i].contains(e)),
             _ => false,
         }
     }
 }
 
-/// Whether a datum has `n` elements that all pass.
-fn each(x: &Datum, n: usize, pass: impl Fn(usize, &Datum) -> bool) -> bool {
-    match x {
-        Datum::Vec(v) => v.len() == n && v.iter().enumerate().all(|(i, x)| pass(i, &Datum::Num(*x))),
-        Datum::List(v) => v.len() == n && v.iter().enumerate().all(|(i, x)| pass(i, x)),
-        _ => false,
-    }
+/// Whether these are shares of 1, but for rounding.
+pub(super) fn is_simplex(xs: &[f64]) -> bool {
+    xs.iter().all(|x| (0.0..=1.0).contains(x)) && (xs.iter().sum::<f64>() - 1.0).abs() <= SIMPLEX_TOLERANCE
 }

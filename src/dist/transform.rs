@@ -1,214 +1,248 @@
-//! To and from unconstrained space: the transforms of Stan (Stan Reference Manual, "Constraint Transforms"): log for positive
-//! numbers, scaled logit for intervals, stick-breaking for the simplex.
+//! The maps between supports and unconstrained space: the identity, log, logit and stick-breaking, as in the Stan reference
+//! manual ("Constraint transforms").
+//!
+//! Points on a boundary, and points that left a support whose bounds moved, map as the nearest points inside: coordinates are
+//! always finite. Whatever comes back is strictly inside.
 
 use super::{Datum, Support};
-use crate::num::{expit, log1p_exp};
+use crate::num::log1p_exp;
+
+/// Coordinates beyond this are no longer told apart: e^-700 is near the smallest double.
+const FAR: f64 = 700.0;
+
+/// The coordinate within those told apart; 0 for NaN.
+#[inline]
+fn near(y: f64) -> f64 {
+    if y.is_nan() { 0.0 } else { y.clamp(-FAR, FAR) }
+}
 
 impl Support {
-    /// The dimension of the unconstrained space; 0 for discrete supports.
+    /// The dimension of the unconstrained space; 0 for discrete values.
     pub fn free_dim(&self) -> usize {
         match self {
-            Support::Real | Support::Positive | Support::NonNegative | Support::Interval { .. } => 1,
             Support::Boolean | Support::Integers { .. } => 0,
             Support::Simplex(n) => n.saturating_sub(1),
             Support::Vector(n) => *n,
-            Support::Repeat(s, n) => s.free_dim() * n,
-            Support::Product(s) => s.iter().map(Support::free_dim).sum(),
+            Support::Product(one, n) => one.free_dim() * n,
+            Support::Each(all) => all.iter().map(Support::free_dim).sum(),
+            _ => 1,
         }
     }
 
-    /// Appends the unconstrained coordinates of a value; values at an edge are moved inside by the least that keeps them
-    /// finite.
+    /// How many numbers a gradient by the value has: those of the continuous parts.
+    pub fn gradient_dim(&self) -> usize {
+        match self {
+            Support::Simplex(n) => *n,
+            Support::Product(one, n) => one.gradient_dim() * n,
+            Support::Each(all) => all.iter().map(Support::gradient_dim).sum(),
+            other => other.free_dim(),
+        }
+    }
+
+    /// The coordinate of a number; 0 for supports that are not continuous numbers.
+    #[inline]
+    pub fn to_free_scalar(&self, x: f64) -> f64 {
+        let y = match self {
+            Support::Real => return if x.is_nan() { 0.0 } else { x.clamp(f64::MIN, f64::MAX) },
+            Support::Positive => libm::log(x),
+            Support::AtLeast { lo } => libm::log(x - lo),
+            Support::Interval { lo, hi } => libm::log(x - lo) - libm::log(hi - x),
+            _ => return 0.0,
+        };
+        match self {
+            _ if y.is_finite() => y.clamp(-FAR, FAR),
+            Support::Interval { lo, hi } if x - lo >= hi - x => FAR,
+            Support::Interval { .. } => -FAR,
+            _ if y == f64::INFINITY => FAR,
+            _ => -FAR,
+        }
+    }
+
+    /// The number at a coordinate, and log |dx/dy| there; (0, 0) for supports that are not continuous numbers.
+    #[inline]
+    pub fn from_free_scalar(&self, y: f64) -> (f64, f64) {
+        match self {
+            Support::Real => (if y.is_nan() { 0.0 } else { y.clamp(f64::MIN, f64::MAX) }, 0.0),
+            Support::Positive => {
+                let y = near(y);
+                (libm::exp(y), y)
+            }
+            Support::AtLeast { lo } => {
+                let y = near(y);
+                ((lo + libm::exp(y)).clamp(lo.next_up(), f64::MAX), y)
+            }
+            Support::Interval { lo, hi } => {
+                let (width, y) = (hi - lo, near(y));
+                let share = libm::exp(-log1p_exp(y.abs()));
+                let x = if y < 0.0 { lo + width * share } else { hi - width * share };
+                let inside = if lo.next_up() < *hi { x.clamp(lo.next_up(), hi.next_down()) } else { *lo };
+                (inside, libm::log(width) - y.abs() - 2.0 * log1p_exp(-y.abs()))
+            }
+            _ => (0.0, 0.0),
+        }
+    }
+
+    /// Appends the coordinates of a value: as many as [`Support::free_dim`], whatever the value.
     pub fn to_free(&self, x: &Datum, out: &mut Vec<f64>) {
+        let end = out.len() + self.free_dim();
         match (self, x) {
-            (Support::Simplex(n), Datum::Vec(v)) if v.len() == *n => {
-                let mut left = 1.0;
-                for (k, p) in v[..n.saturating_sub(1)].iter().enumerate() {
-                    let z = if left > 0.0 { p / left } else { 0.5 };
-                    let rest = (n - 1 - k) as f64;
-                    out.push(logit(z) + libm::log(rest));
-                    left -= p;
-                }
+            (Support::Vector(n), _) => {
+                x.with_numbers(*n, |xs| out.extend(xs.iter().map(|x| Support::Real.to_free_scalar(*x))));
             }
-            (Support::Vector(_), Datum::Vec(v)) => out.extend_from_slice(v),
-            (Support::Repeat(s, n), x) => {
-                (0..*n).for_each(|i| {
-                    if let Some(e) = x.element(i) {
-                        s.to_free(&e, out)
-                    }
-                });
+            (Support::Simplex(n), _) => {
+                x.with_numbers(*n, |xs| stick_lengths(xs, out));
             }
-            (Support::Product(s), x) => {
-                s.iter().enumerate().for_each(|(i, s)| {
-                    if let Some(e) = x.element(i) {
-                        s.to_free(&e, out)
-                    }
-                });
+            (Support::Product(one, n), Datum::Vec(xs)) if one.is_number() && one.free_dim() == 1 => {
+                out.extend(xs.iter().take(*n).map(|x| one.to_free_scalar(*x)));
             }
-            (_, Datum::Num(x)) if self.free_dim() == 1 => out.push(self.to_free_number(*x)),
+            (Support::Product(one, n), _) => {
+                (0..*n).filter_map(|i| x.element(i)).for_each(|x| one.to_free(&x, out));
+            }
+            (Support::Each(all), _) => {
+                all.iter()
+                    .enumerate()
+                    .filter_map(|(i, s)| Some((s, x.element(i)?)))
+                    .for_each(|(s, x)| s.to_free(&x, out));
+            }
+            (_, Datum::Num(x)) if self.free_dim() == 1 => out.push(self.to_free_scalar(*x)),
             _ => {}
         }
+        out.resize(end, 0.0);
     }
 
-    /// The unconstrained coordinate of a number.
-    pub fn to_free_number(&self, x: f64) -> f64 {
-        match self {
-            Support::Positive | Support::NonNegative => libm::log(x.max(f64::MIN_POSITIVE)),
-            Support::Interval { lo, hi } if *hi == f64::INFINITY => libm::log((x - lo).max(f64::MIN_POSITIVE)),
-            Support::Interval { lo, hi } => logit((x - lo) / (hi - lo)),
-            _ => x,
-        }
-    }
-
-    /// The number of an unconstrained coordinate, and the log of the absolute derivative there.
-    pub fn from_free_number(&self, y: f64) -> (f64, f64) {
-        match self {
-            Support::Positive | Support::NonNegative => (libm::exp(y), y),
-            Support::Interval { lo, hi } if *hi == f64::INFINITY => (lo + libm::exp(y), y),
-            Support::Interval { lo, hi } => {
-                let p = expit(y);
-                // From the nearer end, so that no precision is lost close to the upper one.
-                let x = if y < 0.0 { lo + (hi - lo) * p } else { hi - (hi - lo) * expit(-y) };
-                (x, libm::log(hi - lo) - log1p_exp(-y) - log1p_exp(y))
-            }
-            _ => (y, 0.0),
-        }
-    }
-
-    /// The value of unconstrained coordinates, and the log absolute determinant of the derivative there.
+    /// The value at a point of unconstrained space, and log |dx/dy| there (for a simplex, of all shares but the last). Missing
+    /// coordinates count as 0. A discrete part is at its least value.
     pub fn from_free(&self, y: &[f64]) -> (Datum, f64) {
+        let at = |i: usize| y.get(i).copied().unwrap_or(0.0);
         match self {
-            Support::Simplex(n) => {
-                let mut left = 1.0;
-                let mut log_left = 0.0;
-                let mut log_jacobian = 0.0;
-                let mut v = Vec::with_capacity(*n);
-                for (k, y) in y.iter().take(n.saturating_sub(1)).enumerate() {
-                    let y = y - libm::log((n - 1 - k) as f64);
-                    let z = expit(y);
-                    log_jacobian += log_left - log1p_exp(-y) - log1p_exp(y);
-                    v.push(left * z);
-                    left *= expit(-y);
-                    log_left -= log1p_exp(y);
-                }
-                v.push(left);
-                (Datum::Vec(v.into()), log_jacobian)
-            }
-            Support::Vector(_) => (Datum::Vec(y.into()), 0.0),
-            Support::Repeat(s, n) => {
-                let d = s.free_dim();
-                let parts = (0..*n).map(|i| s.from_free(y.get(i * d..(i + 1) * d).unwrap_or_default()));
-                collect(parts)
-            }
-            Support::Product(supports) => {
-                let mut at = 0;
-                let parts = supports.iter().map(|s| {
-                    let d = s.free_dim();
-                    at += d;
-                    s.from_free(y.get(at - d..at).unwrap_or_default())
-                });
-                collect(parts)
-            }
             Support::Boolean => (Datum::Bool(false), 0.0),
             Support::Integers { lo, .. } => (Datum::Num(*lo as f64), 0.0),
-            _ => {
-                let (x, j) = self.from_free_number(y.first().copied().unwrap_or(0.0));
-                (Datum::Num(x), j)
+            Support::Vector(n) => {
+                ((0..*n).map(|i| Support::Real.from_free_scalar(at(i)).0).collect::<Vec<_>>().into(), 0.0)
             }
-        }
-    }
-}
-
-fn collect(parts: impl Iterator<Item = (Datum, f64)>) -> (Datum, f64) {
-    let mut jacobian = 0.0;
-    let items = parts
-        .map(|(d, j)| {
-            jacobian += j;
-            d
-        })
-        .collect();
-    (Datum::from_elements(items), jacobian)
-}
-
-/// ln(p / (1 - p)), finite also at 0 and 1.
-fn logit(p: f64) -> f64 {
-    let p = p.clamp(f64::MIN_POSITIVE, 1.0 - f64::EPSILON / 2.0);
-    libm::log(p) - libm::log1p(-p)
-}
-
-#[cfg(test)]
-mod tests {
-    use super::*;
-
-    fn cases() -> Vec<(Support, Vec<f64>)> {
-        let interval = |lo, hi| Support::Interval { lo, hi };
-        vec![
-            (Support::Real, vec![-1.3]),
-            (Support::Positive, vec![0.7]),
-            (Support::NonNegative, vec![-2.0]),
-            (interval(-2.0, 5.0), vec![0.4]),
-            (interval(-2.0, 5.0), vec![-3.0]),
-            (interval(1.0, f64::INFINITY), vec![0.3]),
-            (Support::Simplex(4), vec![0.3, -0.8, 1.1]),
-            (Support::Vector(3), vec![1.0, -2.0, 0.5]),
-            (Support::Repeat(Box::new(Support::Positive), 3), vec![0.1, 0.2, -0.3]),
-            (Support::Product([Support::Real, Support::Positive].into()), vec![0.1, 0.2]),
-        ]
-    }
-
-    fn flat(x: &Datum) -> Vec<f64> {
-        match x {
-            Datum::Num(x) => vec![*x],
-            Datum::Vec(v) => v.to_vec(),
-            _ => unreachable!("only numbers here"),
-        }
-    }
-
-    #[test]
-    fn there_and_back() {
-        for (s, y) in cases() {
-            let (x, _) = s.from_free(&y);
-            assert!(s.contains(&x) && s.fits(&x), "{s:?}: {x:?}");
-            let mut back = Vec::new();
-            s.to_free(&x, &mut back);
-            assert_eq!(back.len(), s.free_dim());
-            assert!(back.iter().zip(&y).all(|(a, b)| (a - b).abs() < 1e-12), "{s:?}: {back:?} against {y:?}");
-        }
-    }
-
-    #[test]
-    fn jacobians_against_differences() {
-        for (s, y) in cases() {
-            let n = s.free_dim();
-            let h = 1e-6;
-            let m = nalgebra::DMatrix::from_fn(n, n, |i, j| {
-                let at = |d: f64| {
-                    let mut y = y.clone();
-                    y[j] += d;
-                    flat(&s.from_free(&y).0)[i]
+            Support::Simplex(n) => {
+                let (x, jacobian) = break_stick(*n, at);
+                (x.into(), jacobian)
+            }
+            Support::Product(one, n) if one.is_number() && one.free_dim() == 1 => {
+                let mut jacobian = 0.0;
+                let mut put = |i| {
+                    let (x, j) = one.from_free_scalar(at(i));
+                    jacobian += j;
+                    x
                 };
-                (at(h) - at(-h)) / (2.0 * h)
-            });
-            let expected = m.determinant().abs().ln();
-            let got = s.from_free(&y).1;
-            assert!((got - expected).abs() < 1e-7, "{s:?}: {got} against {expected}");
+                let xs: Vec<f64> = (0..*n).map(&mut put).collect();
+                (xs.into(), jacobian)
+            }
+            Support::Product(one, n) => join((0..*n).map(|_| &**one), y),
+            Support::Each(all) => join(all.iter(), y),
+            number => {
+                let (x, jacobian) = number.from_free_scalar(at(0));
+                (Datum::Num(x), jacobian)
+            }
         }
     }
 
-    #[test]
-    fn extremes_stay_finite() {
-        for (s, _) in cases() {
-            for y in [-700.0, -40.0, 40.0, 700.0] {
-                let (x, j) = s.from_free(&vec![y; s.free_dim()]);
-                assert!(j.is_finite(), "{s:?} at {y}: {j}");
-                assert!(flat(&x).iter().all(|x| x.is_finite()), "{s:?} at {y}: {x:?}");
+    /// Appends the derivative by the coordinates of log p(x(y)) + log |dx/dy|, from that of log p by the value (as in
+    /// [`super::Gradient`], so without numbers for discrete parts): what gradient-based moves need.
+    pub fn free_gradient(&self, y: &[f64], by_x: &[f64], out: &mut Vec<f64>) {
+        let at = |i: usize| y.get(i).copied().unwrap_or(0.0);
+        let by = |i: usize| by_x.get(i).copied().unwrap_or(0.0);
+        match self {
+            Support::Boolean | Support::Integers { .. } => {}
+            Support::Real => out.push(by(0)),
+            Support::Vector(n) => out.extend((0..*n).map(by)),
+            Support::Positive | Support::AtLeast { .. } => out.push(by(0) * libm::exp(near(at(0))) + 1.0),
+            Support::Interval { lo, hi } => {
+                let p = crate::num::expit(near(at(0)));
+                out.push(by(0) * (hi - lo) * p * (1.0 - p) + 1.0 - 2.0 * p);
+            }
+            Support::Simplex(n) => stick_gradient(*n, at, by, out),
+            Support::Product(one, n) => {
+                let (dy, dx) = (one.free_dim(), one.gradient_dim());
+                (0..*n).for_each(|i| one.free_gradient(part(y, i * dy, dy), part(by_x, i * dx, dx), out));
+            }
+            Support::Each(all) => {
+                let (mut from_y, mut from_x) = (0, 0);
+                for s in all.iter() {
+                    let (dy, dx) = (s.free_dim(), s.gradient_dim());
+                    s.free_gradient(part(y, from_y, dy), part(by_x, from_x, dx), out);
+                    (from_y, from_x) = (from_y + dy, from_x + dx);
+                }
             }
         }
-        let mut y = Vec::new();
-        Support::Interval { lo: 0.0, hi: 1.0 }.to_free(&Datum::Num(0.0), &mut y);
-        Support::Interval { lo: 0.0, hi: 1.0 }.to_free(&Datum::Num(1.0), &mut y);
-        Support::NonNegative.to_free(&Datum::Num(0.0), &mut y);
-        Support::Simplex(3).to_free(&Datum::Vec([1.0, 0.0, 0.0].into()), &mut y);
-        assert!(y.iter().all(|y| y.is_finite()), "{y:?}");
     }
+}
+
+fn part(xs: &[f64], from: usize, len: usize) -> &[f64] {
+    xs.get(from..from + len).unwrap_or(&[])
+}
+
+fn join<'a>(parts: impl Iterator<Item = &'a Support>, y: &[f64]) -> (Datum, f64) {
+    let (mut from, mut jacobian) = (0, 0.0);
+    let mut one = |s: &Support| {
+        let n = s.free_dim();
+        let (x, j) = s.from_free(part(y, from, n));
+        from += n;
+        jacobian += j;
+        x
+    };
+    let xs: Vec<Datum> = parts.map(&mut one).collect();
+    (Datum::from_elements(xs), jacobian)
+}
+
+/// The offset that puts equal shares at 0: minus the log odds of 1 among those left.
+fn offset(n: usize, k: usize) -> f64 {
+    libm::log((n - 1 - k) as f64)
+}
+
+/// The coordinates of shares. What is left is summed from the end, where the small terms of a long stick are.
+fn stick_lengths(xs: &[f64], out: &mut Vec<f64>) {
+    let n = xs.len();
+    let start = out.len();
+    let mut rest = xs.last().copied().unwrap_or(1.0);
+    for k in (0..n.saturating_sub(1)).rev() {
+        let x = xs[k];
+        let y = libm::log(x.max(f64::MIN_POSITIVE)) - libm::log(rest.max(f64::MIN_POSITIVE)) + offset(n, k);
+        out.push(y.clamp(-FAR, FAR));
+        rest += x;
+    }
+    out[start..].reverse();
+}
+
+/// The shares at a point, and the log Jacobian. The length left is kept as a logarithm.
+fn break_stick(n: usize, at: impl Fn(usize) -> f64) -> (Vec<f64>, f64) {
+    let mut xs = Vec::with_capacity(n);
+    let (mut log_rest, mut jacobian) = (0.0, 0.0);
+    for k in 0..n.saturating_sub(1) {
+        let y = near(at(k)) - offset(n, k);
+        let (log_taken, log_left) = (-log1p_exp(-y), -log1p_exp(y));
+        xs.push(libm::exp(log_rest + log_taken).max(f64::MIN_POSITIVE));
+        jacobian += log_rest + log_taken + log_left;
+        log_rest += log_left;
+    }
+    if n > 0 {
+        xs.push(libm::exp(log_rest).max(f64::MIN_POSITIVE));
+    }
+    (xs, jacobian)
+}
+
+/// With z the share taken of what is left, x_k = rest_k z_k: the derivatives by y_k of x_k and of all shares after it.
+fn stick_gradient(n: usize, at: impl Fn(usize) -> f64, by: impl Fn(usize) -> f64, out: &mut Vec<f64>) {
+    if n < 2 {
+        return;
+    }
+    let start = out.len();
+    let (xs, _) = break_stick(n, &at);
+    // The sum of x_j dlogp/dx_j over the shares after k.
+    let mut after = xs[n - 1] * by(n - 1);
+    for k in (0..n - 1).rev() {
+        let z = crate::num::expit(at(k) - offset(n, k));
+        let own = xs[k] * by(k);
+        // d log x_k = 1 - z; d log x_j = -z for j > k; the Jacobian has log z_k + log (1 - z_k) and log rest_j for j > k.
+        let later = (n - 2 - k) as f64;
+        out.push(own * (1.0 - z) - after * z + 1.0 - 2.0 * z - later * z);
+        after += own;
+    }
+    out[start..].reverse();
 }

@@ -1,60 +1,55 @@
-//! The uniform distribution on a range of whole numbers.
+//! The uniform distribution on a range of integers.
 
-use super::{Datum, Distribution, Gradient, ParamError, Support, number};
+use super::param::integer;
+use super::{ParamError, Scalar, Slope, Support};
 use crate::rng::Stream;
 
-/// uniform_discrete(lo, hi), both ends included
+/// `uniform_discrete(lo, hi)`, both ends included.
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub struct UniformDiscrete {
-    lo: i64,
-    hi: i64,
+    lo: f64,
+    hi: f64,
+    log_probability: f64,
 }
 
 impl UniformDiscrete {
-    /// The least and the greatest value.
-    ///
-    /// # Errors
-    /// Unless both are whole numbers below 2^53 in size and `lo <= hi`.
-    pub fn new(lo: f64, hi: f64) -> Result<Self, ParamError> {
-        let whole = |name, x: f64| {
-            if x == libm::trunc(x) && x.abs() < 9_007_199_254_740_992.0 {
-                Ok(x as i64)
-            } else {
-                Err(ParamError::new("uniform_discrete", name, "a whole number", x))
-            }
-        };
-        let (lo, hi) = (whole("lo", lo)?, whole("hi", hi)?);
+    /// Between these integers; fails unless both are integers of at most 2^53 in size and `lo` is not above `hi`.
+    pub fn new(lo: f64, hi: f64) -> Result<UniformDiscrete, ParamError> {
+        let (lo, hi) = (integer(Self::NAME, "lo", lo)?, integer(Self::NAME, "hi", hi)?);
         if lo > hi {
-            return Err(ParamError::new("uniform_discrete", "hi", "at least lo", format!("{hi} with lo = {lo}")));
+            return Err(ParamError::new(Self::NAME, "lo", format!("{lo} and {hi}"), "must not be above hi"));
         }
-        Ok(UniformDiscrete { lo, hi })
+        Ok(UniformDiscrete { lo, hi, log_probability: -libm::log(hi - lo + 1.0) })
     }
 }
 
-impl Distribution for UniformDiscrete {
-    fn name(&self) -> &'static str {
-        "uniform_discrete"
+impl Scalar for UniformDiscrete {
+    const NAME: &'static str = "uniform_discrete";
+
+    fn number_support(&self) -> Support {
+        Support::Integers { lo: self.lo as i64, hi: Some(self.hi as i64) }
     }
 
-    fn support(&self) -> Support {
-        Support::Integers { lo: self.lo, hi: Some(self.hi) }
+    fn draw(&self, rng: &mut Stream) -> f64 {
+        let count = self.hi as i64 - self.lo as i64 + 1;
+        (self.lo as i64 + rng.index(count as usize) as i64) as f64
     }
 
-    fn sample(&self, rng: &mut Stream) -> Datum {
-        Datum::Num((self.lo + rng.index((self.hi - self.lo) as usize + 1) as i64) as f64)
+    #[inline]
+    fn log_density_num(&self, x: f64) -> f64 {
+        if (self.lo..=self.hi).contains(&x) && x == libm::trunc(x) { self.log_probability } else { f64::NEG_INFINITY }
     }
 
-    fn log_density(&self, x: &Datum) -> f64 {
-        let x = number(x);
-        if x == libm::trunc(x) && self.lo as f64 <= x && x <= self.hi as f64 {
-            -libm::log((self.hi - self.lo) as f64 + 1.0)
-        } else {
-            f64::NEG_INFINITY
-        }
+    fn slope(&self, _x: f64) -> Slope {
+        Slope::discrete([0.0, 0.0])
     }
 
-    /// Whole parameters have no derivative.
-    fn gradient(&self, x: &Datum) -> Option<Gradient> {
-        self.support().contains(x).then(|| Gradient { x: Vec::new(), params: Vec::new() })
+    fn number_mean(&self) -> Option<f64> {
+        Some(0.5 * (self.lo + self.hi))
+    }
+
+    fn number_sd(&self) -> Option<f64> {
+        let n = self.hi - self.lo + 1.0;
+        Some(((n - 1.0) * (n + 1.0) / 12.0).sqrt())
     }
 }

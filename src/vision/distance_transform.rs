@@ -1,174 +1,246 @@
-//! The exact Euclidean distance transform in linear time (Felzenszwalb and Huttenlocher 2012, "Distance Transforms of
-//! Sampled Functions"), with the nearest point.
+//! The exact Euclidean distance transform: for every pixel the distance to the nearest set pixel, and which one that is.
+//! Felzenszwalb & Huttenlocher 2012, "Distance transforms of sampled functions", Theory of Computing 8, 415-428: lower envelopes
+//! of parabolas, rows after columns, linear time. Distances are between pixel centres, in pixels, exact up to one rounding.
 
-/// In [`DistanceMap::nearest`]: there is no set pixel.
-pub const NOWHERE: u32 = u32::MAX;
-
-/// For each pixel the distance between its centre and that of the nearest set one.
-#[derive(Clone, Debug, PartialEq)]
+/// Distances to the nearest set pixel of a map.
+#[derive(Clone, Debug, Default, PartialEq)]
 pub struct DistanceMap {
-    /// Width in pixels.
+    /// Width, pixels.
     pub width: u32,
-    /// Height in pixels.
+    /// Height, pixels.
     pub height: u32,
-    /// Distances in pixels; the picture's diagonal everywhere if no pixel is set.
+    /// Distances, pixels, row by row. Where no pixel is set, all are the map's diagonal.
     pub values: Vec<f32>,
-    /// The nearest set pixel, `y * width + x`; [`NOWHERE`] if none is set.
+    /// Index (row * width + column) of a nearest set pixel; `u32::MAX` everywhere where none is set.
     pub nearest: Vec<u32>,
 }
 
-/// Distances to the set pixels of a picture; pixels that `set` is too short for are not set.
-pub fn distance_transform(width: u32, height: u32, set: &[bool]) -> DistanceMap {
-    let (w, h) = (width as usize, height as usize);
-    // First the nearest set pixel in each column, in two sweeps.
-    let mut row_of = vec![NOWHERE; w * h];
-    for x in 0..w {
-        let mut last = NOWHERE;
-        for y in 0..h {
-            if set.get(y * w + x) == Some(&true) {
-                last = y as u32;
+const NONE: u32 = u32::MAX;
+
+/// Scratch of one line's lower envelope.
+struct Envelope {
+    /// Places of the parabolas, from the left.
+    place: Vec<usize>,
+    /// From where on each is the lowest.
+    from: Vec<f64>,
+}
+
+impl Envelope {
+    fn new(n: usize) -> Self {
+        Envelope { place: Vec::with_capacity(n), from: Vec::with_capacity(n) }
+    }
+
+    /// The envelope of the parabolas `(x - q)^2 + f(q)` over the `q` where `f` is finite.
+    fn build(&mut self, f: &[f64]) {
+        self.place.clear();
+        self.from.clear();
+        for (q, &fq) in f.iter().enumerate().filter(|(_, v)| v.is_finite()) {
+            let mut start = f64::NEG_INFINITY;
+            while let (Some(&p), Some(&z)) = (self.place.last(), self.from.last()) {
+                let (a, b) = (q as f64, p as f64);
+                // p < q; values are squares of integers, exact in f64.
+                start = ((fq + a * a) - (f[p] + b * b)) / (2.0 * (a - b));
+                if start > z {
+                    break;
+                }
+                self.place.pop();
+                self.from.pop();
+                start = f64::NEG_INFINITY;
             }
-            row_of[y * w + x] = last;
-        }
-        let mut below = NOWHERE;
-        for y in (0..h).rev() {
-            if set.get(y * w + x) == Some(&true) {
-                below = y as u32;
-            }
-            let above = row_of[y * w + x];
-            let gap = |row: u32| if row == NOWHERE { u32::MAX } else { row.abs_diff(y as u32) };
-            if gap(below) < gap(above) {
-                row_of[y * w + x] = below;
-            }
+            self.place.push(q);
+            self.from.push(start);
         }
     }
-    // Then along each row the lower envelope of the parabolas above its columns.
-    let diagonal = libm::hypot(w as f64, h as f64) as f32;
-    let mut map = DistanceMap { width, height, values: vec![diagonal; w * h], nearest: vec![NOWHERE; w * h] };
-    let (mut columns, mut starts) = (vec![0usize; w], vec![0f64; w + 1]);
-    for y in 0..h {
-        let rows = &row_of[y * w..(y + 1) * w];
-        let height_of = |x: usize| {
-            let d = f64::from(rows[x]) - y as f64;
-            d * d
-        };
-        let mut count = 0;
-        for x in (0..w).filter(|x| rows[*x] != NOWHERE) {
-            let crossing = |c: usize| {
-                let (xf, cf) = (x as f64, c as f64);
-                ((height_of(x) + xf * xf) - (height_of(c) + cf * cf)) / (2.0 * (xf - cf))
-            };
-            while count > 0 && crossing(columns[count - 1]) <= starts[count - 1] {
-                count -= 1;
-            }
-            starts[count] = if count == 0 { f64::NEG_INFINITY } else { crossing(columns[count - 1]) };
-            columns[count] = x;
-            count += 1;
-        }
-        if count == 0 {
-            continue;
-        }
+
+    /// The lowest parabola of every place, in order; nothing for an empty envelope.
+    fn walk(&self, n: usize) -> impl Iterator<Item = usize> + '_ {
         let mut k = 0;
-        for x in 0..w {
-            while k + 1 < count && starts[k + 1] < x as f64 {
+        (0..if self.place.is_empty() { 0 } else { n }).map(move |x| {
+            while self.from.get(k + 1).is_some_and(|&z| z < x as f64) {
                 k += 1;
             }
-            let c = columns[k];
-            let dx = x as f64 - c as f64;
-            map.values[y * w + x] = (dx * dx + height_of(c)).sqrt() as f32;
-            map.nearest[y * w + x] = rows[c] * width + c as u32;
+            self.place[k]
+        })
+    }
+}
+
+/// The distance transform of a map of `width` x `height` pixels; pixels beyond the end of `set` are not set. When no pixel is
+/// set, all distances are the diagonal and all `nearest` are `u32::MAX`.
+pub fn distance_transform(width: u32, height: u32, set: &[bool]) -> DistanceMap {
+    let (w, h) = (width as usize, height as usize);
+    let mut nearest = vec![NONE; w * h];
+    let mut values = vec![libm::hypot(f64::from(width), f64::from(height)) as f32; w * h];
+    if w * h == 0 || !set.iter().take(w * h).any(|&s| s) {
+        return DistanceMap { width, height, values, nearest };
+    }
+    // Columns: the distance to the nearest set pixel above or below, squared, and its row.
+    let mut squared = vec![f64::INFINITY; w * h];
+    let is_set = |i: usize| set.get(i).copied().unwrap_or(false);
+    for x in 0..w {
+        let mut last = None;
+        for y in 0..h {
+            if is_set(y * w + x) {
+                last = Some(y);
+            }
+            if let Some(row) = last {
+                squared[y * w + x] = ((y - row) * (y - row)) as f64;
+                nearest[y * w + x] = (row * w + x) as u32;
+            }
+        }
+        last = None;
+        for y in (0..h).rev() {
+            if is_set(y * w + x) {
+                last = Some(y);
+            }
+            if let Some(row) = last {
+                let d = ((row - y) * (row - y)) as f64;
+                if d < squared[y * w + x] {
+                    squared[y * w + x] = d;
+                    nearest[y * w + x] = (row * w + x) as u32;
+                }
+            }
         }
     }
-    map
+    // Rows: the lower envelope over columns.
+    let mut envelope = Envelope::new(w);
+    let mut row_nearest = vec![NONE; w];
+    for y in 0..h {
+        let row = y * w..(y + 1) * w;
+        envelope.build(&squared[row.clone()]);
+        row_nearest.copy_from_slice(&nearest[row.clone()]);
+        for (x, q) in envelope.walk(w).enumerate() {
+            let d = x.abs_diff(q);
+            values[y * w + x] = (squared[y * w + q] + (d * d) as f64).sqrt() as f32;
+            nearest[y * w + x] = row_nearest[q];
+        }
+    }
+    DistanceMap { width, height, values, nearest }
 }
 
 impl DistanceMap {
-    /// The distance at a place (pixel centres at +0.5) by bilinear interpolation, and its derivatives. Outside of the picture
-    /// it is the value at the border plus the distance from there.
+    /// The distance at a place in pixel coordinates (pixel centres at +0.5) and its derivatives along x and y: bilinear between
+    /// pixel centres. Beyond the outermost centres it is the value at the nearest place between them plus the distance to that
+    /// place, so it is continuous everywhere. At coordinates that are not finite, and in a map without pixels, it is the map's
+    /// diagonal with derivatives 0.
     pub fn sample(&self, x: f32, y: f32) -> (f32, f32, f32) {
         let (w, h) = (self.width as usize, self.height as usize);
-        if w == 0 || h == 0 {
-            return (0.0, 0.0, 0.0);
+        if w == 0 || h == 0 || !x.is_finite() || !y.is_finite() {
+            return (libm::hypot(f64::from(self.width), f64::from(self.height)) as f32, 0.0, 0.0);
         }
-        let (u, v) = (x - 0.5, y - 0.5);
-        let (cu, cv) = (u.clamp(0.0, (w - 1) as f32), v.clamp(0.0, (h - 1) as f32));
-        let (x0, y0) = ((cu as usize).min(w.saturating_sub(2)), (cv as usize).min(h.saturating_sub(2)));
-        let (x1, y1) = ((x0 + 1).min(w - 1), (y0 + 1).min(h - 1));
-        let (fx, fy) = (cu - x0 as f32, cv - y0 as f32);
-        let at = |x: usize, y: usize| self.values[y * w + x];
-        let (a, b, c, d) = (at(x0, y0), at(x1, y0), at(x0, y1), at(x1, y1));
-        let (top, bottom) = (a + (b - a) * fx, c + (d - c) * fx);
-        let value = top + (bottom - top) * fy;
-        let mut dx = (b - a) * (1.0 - fy) + (d - c) * fy;
-        let mut dy = bottom - top;
+        let (u, v) = (f64::from(x) - 0.5, f64::from(y) - 0.5);
+        let (cu, cv) = (u.clamp(0.0, (w - 1) as f64), v.clamp(0.0, (h - 1) as f64));
+        let (i, j) = (cu as usize, cv as usize);
+        let (fx, fy) = (cu - i as f64, cv - j as f64);
+        let at = |i: usize, j: usize| f64::from(self.values[j.min(h - 1) * w + i.min(w - 1)]);
+        let (a, b, c, d) = (at(i, j), at(i + 1, j), at(i, j + 1), at(i + 1, j + 1));
+        let top = a + fx * (b - a);
+        let bottom = c + fx * (d - c);
+        let mut value = top + fy * (bottom - top);
+        let mut dx = if cu == u { (b - a) + fy * ((d - c) - (b - a)) } else { 0.0 };
+        let mut dy = if cv == v { bottom - top } else { 0.0 };
         let (ox, oy) = (u - cu, v - cv);
-        let out = ox.hypot(oy);
+        let out = (ox * ox + oy * oy).sqrt();
         if out > 0.0 {
-            if ox != 0.0 {
-                dx = ox / out;
-            }
-            if oy != 0.0 {
-                dy = oy / out;
-            }
+            value += out;
+            dx += ox / out;
+            dy += oy / out;
         }
-        (value + out, dx, dy)
+        (value as f32, dx as f32, dy as f32)
     }
 }
 
 #[cfg(test)]
 mod tests {
     use super::*;
+    use crate::rng::{Purpose, StreamKey};
 
-    fn slow(w: usize, h: usize, set: &[bool]) -> Vec<f32> {
-        let near = |x: usize, y: usize| {
-            let d = |i: usize| ((i % w) as f64 - x as f64).powi(2) + ((i / w) as f64 - y as f64).powi(2);
-            (0..w * h).filter(|i| set[*i]).map(d).fold(f64::INFINITY, f64::min).sqrt() as f32
-        };
-        (0..w * h).map(|i| near(i % w, i / w)).collect()
+    fn brute(w: usize, h: usize, set: &[bool]) -> Vec<f32> {
+        let on: Vec<(i64, i64)> = (0..w * h).filter(|&i| set[i]).map(|i| ((i % w) as i64, (i / w) as i64)).collect();
+        (0..w * h)
+            .map(|i| {
+                let (x, y) = ((i % w) as i64, (i / w) as i64);
+                let d = on.iter().map(|(a, b)| (a - x).pow(2) + (b - y).pow(2)).min().unwrap();
+                (d as f64).sqrt() as f32
+            })
+            .collect()
+    }
+
+    fn random(w: usize, h: usize, density: f64, seed: u64) -> Vec<bool> {
+        let mut s = StreamKey::new(seed, 0, Purpose::VALUES).stream(0, 0, 0);
+        (0..w * h).map(|_| s.uniform() < density).collect()
     }
 
     #[test]
     fn equal_to_brute_force() {
-        let mut state = 1u64;
-        let mut next = || {
-            state = state.wrapping_mul(6364136223846793005).wrapping_add(1442695040888963407);
-            (state >> 33) as f64 / f64::from(1u32 << 31)
-        };
-        for (w, h) in [(1, 1), (1, 9), (9, 1), (13, 7), (20, 31)] {
-            for density in [0.02, 0.2, 0.9, 1.1] {
-                let mut set: Vec<bool> = (0..w * h).map(|_| next() < density).collect();
-                set[w * h / 2] = true;
+        let mut seed = 0;
+        for (w, h) in [(1, 1), (1, 17), (23, 1), (2, 2), (16, 9), (31, 40)] {
+            for density in [0.01, 0.1, 0.5, 1.0] {
+                seed += 1;
+                let mut set = random(w, h, density, seed);
+                set[(seed as usize * 7) % (w * h)] = true;
                 let map = distance_transform(w as u32, h as u32, &set);
-                assert_eq!(map.values, slow(w, h, &set), "{w}x{h} at {density}");
-                for (i, n) in map.nearest.iter().enumerate() {
-                    let n = *n as usize;
+                assert_eq!(map.values, brute(w, h, &set), "{w} x {h} {density}");
+                for (i, &n) in map.nearest.iter().enumerate() {
+                    let n = n as usize;
                     assert!(set[n]);
-                    let d = ((n % w) as f64 - (i % w) as f64).hypot((n / w) as f64 - (i / w) as f64);
-                    assert!((d as f32 - map.values[i]).abs() < 1e-5);
+                    let d2 = (n % w).abs_diff(i % w).pow(2) + (n / w).abs_diff(i / w).pow(2);
+                    assert_eq!((d2 as f64).sqrt() as f32, map.values[i]);
                 }
             }
         }
     }
 
     #[test]
-    fn nothing_set_is_the_diagonal() {
+    fn empty_and_odd_maps() {
         let map = distance_transform(3, 4, &[false; 12]);
-        assert!(map.values.iter().all(|v| *v == 5.0) && map.nearest.iter().all(|n| *n == NOWHERE));
-        assert!(distance_transform(0, 5, &[]).values.is_empty());
+        assert!(map.values.iter().all(|&v| v == 5.0));
+        assert!(map.nearest.iter().all(|&n| n == u32::MAX));
+        assert_eq!(distance_transform(0, 5, &[]).values.len(), 0);
+        assert_eq!(distance_transform(0, 5, &[]).sample(1.0, 1.0), (5.0, 0.0, 0.0));
+        // Missing pixels are not set.
+        assert_eq!(distance_transform(3, 1, &[true]).values, [0.0, 1.0, 2.0]);
     }
 
     #[test]
-    fn reading_is_continuous_and_has_its_derivative() {
-        let mut set = [false; 80];
-        set[33] = true;
-        let map = distance_transform(10, 8, &set);
-        assert_eq!(map.sample(3.5, 3.5).0, 0.0);
-        let h = 1e-3;
-        for (x, y) in [(2.3, 5.1), (7.9, 1.2), (-2.0, 4.3), (12.0, -3.0), (5.2, 9.5)] {
-            let (v, dx, dy) = map.sample(x, y);
-            assert!(((map.sample(x + h, y).0 - map.sample(x - h, y).0) / (2.0 * h) - dx).abs() < 2e-2, "{x} {y}");
-            assert!(((map.sample(x, y + h).0 - map.sample(x, y - h).0) / (2.0 * h) - dy).abs() < 2e-2, "{x} {y}");
-            assert!((map.sample(x + 1e-4, y).0 - v).abs() < 1e-3);
+    fn samples_meet_pixels_and_derivatives() {
+        let set = random(12, 9, 0.05, 5);
+        let map = distance_transform(12, 9, &set);
+        for j in 0..9 {
+            for i in 0..12 {
+                assert_eq!(map.sample(i as f32 + 0.5, j as f32 + 0.5).0, map.values[j * 12 + i]);
+            }
         }
+        let mut s = StreamKey::new(9, 0, Purpose::VALUES).stream(0, 0, 0);
+        let mut checked = 0;
+        for _ in 0..2000 {
+            let (x, y) = (s.uniform() as f32 * 24.0 - 6.0, s.uniform() as f32 * 21.0 - 6.0);
+            let e = 1.0 / 256.0;
+            // A cell's border between the two samples has two derivatives.
+            let crosses = |v: f32| ((v - 0.5 - e).floor() - (v - 0.5 + e).floor()) != 0.0;
+            if crosses(x) || crosses(y) {
+                continue;
+            }
+            let (_, dx, dy) = map.sample(x, y);
+            let nx = (map.sample(x + e, y).0 - map.sample(x - e, y).0) / (2.0 * e);
+            let ny = (map.sample(x, y + e).0 - map.sample(x, y - e).0) / (2.0 * e);
+            assert!((dx - nx).abs() < 2e-3 && (dy - ny).abs() < 2e-3, "({x}, {y}): {dx} {nx} {dy} {ny}");
+            checked += 1;
+        }
+        assert!(checked > 1500);
+    }
+
+    #[test]
+    fn outside_is_continuous_and_grows() {
+        let map = distance_transform(8, 8, &random(8, 8, 0.1, 2));
+        for k in 0..80 {
+            let y = k as f32 * 0.1;
+            for edge in [0.5f32, 7.5] {
+                let (a, b) = (map.sample(edge - 1e-4, y).0, map.sample(edge + 1e-4, y).0);
+                assert!((a - b).abs() < 1e-3);
+            }
+        }
+        assert_eq!(map.sample(-9.5, 0.5).0, map.values[0] + 10.0);
+        assert_eq!(map.sample(f32::NAN, 0.5).1, 0.0);
+        assert!(map.sample(f32::MAX, f32::MAX).0.is_finite() || map.sample(f32::MAX, f32::MAX).0 == f32::INFINITY);
     }
 }

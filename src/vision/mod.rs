@@ -1,22 +1,27 @@
-//! Looking at pictures: photographs, their contours, and how well rendered contours, masks and depths explain them.
+//! From pictures to evidence: reading photographs, masks and depth maps; contours; and how well what was rendered explains
+//! them. Nothing here knows of scenes or of rendering: what is compared with a picture arrives as arrays of its size.
 //!
-//! Knows nothing of meshes, cameras, programs or traces: rendered contours arrive as slices of numbers.
+//! Everywhere in this module a pixel `(i, j)` (column, row; row 0 on top) covers `[i, i+1] x [j, j+1]`, so its centre is at
+//! `(i + 0.5, j + 0.5)`, and arrays run row by row.
 
 pub mod chamfer;
-mod color;
+pub mod color;
 pub mod contour_map;
 pub mod contour_ratio;
-mod depth;
-mod detector;
+pub mod depth;
+pub mod detector;
 pub mod distance_transform;
 pub mod elements;
-mod error;
+pub mod error;
+pub mod exif;
 mod field;
-mod gradient;
-mod mask;
+pub mod gradient;
+pub mod mask;
+pub mod nms;
 pub mod npy;
-mod photo;
-mod resize;
+pub mod photo;
+pub mod resize;
+mod thin;
 
 #[cfg(test)]
 mod testing;
@@ -25,9 +30,9 @@ pub use chamfer::{Chamfer, ChamferOptions};
 pub use contour_map::ContourMap;
 pub use contour_ratio::{ContourRatio, ContourRatioOptions};
 pub use depth::{DepthLikelihood, DepthMap};
-pub use detector::ContourDetector;
+pub use detector::{ContourDetector, GradientDetector};
+pub use distance_transform::{DistanceMap, distance_transform};
 pub use elements::{ComparatorError, Elements};
 pub use error::VisionError;
-pub use gradient::GradientDetector;
 pub use mask::{Mask, MaskLikelihood};
 pub use photo::{Limits, Photo};

@@ -1,147 +1,251 @@
-//! Photographs: decoding with limits that are checked before any pixel is allocated, and the right way up.
+//! Photographs: reading PNG and JPEG files (8 or 16 bit, grey, palette, colour, alpha) and shrinking them in linear light.
+//! Not a general picture reader. A [`Photo`] stands upright (Exif orientation applied), is opaque (alpha laid over white, on the
+//! sRGB values as viewers do) and has at least one pixel.
 
-use super::VisionError;
-use image::{DynamicImage, ImageDecoder, ImageReader, RgbImage, Rgba};
+use super::color::linear_table;
+use super::error::{VisionError, read_bytes};
+use super::{exif, resize};
+use image::{DynamicImage, ImageDecoder, ImageError, ImageFormat, ImageReader, RgbImage};
 use std::io::Cursor;
+use std::path::Path;
 
-/// Bounds on what is decoded.
+/// How large a picture may be. The size in the header is checked before pixels get memory.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 pub struct Limits {
-    /// The longest side in pixels.
-    pub side: u32,
-    /// The most pixels, in millions.
-    pub megapixels: u64,
+    /// The longest side, pixels.
+    pub max_side: u32,
+    /// The most pixels in all.
+    pub max_pixels: u64,
 }
 
 impl Default for Limits {
     fn default() -> Self {
-        Limits { side: 16384, megapixels: 100 }
+        Limits { max_side: 16384, max_pixels: 100_000_000 }
     }
 }
 
-/// A photograph, 8 bits a channel, upright.
-#[derive(Clone, Debug, PartialEq, Eq)]
+impl Limits {
+    /// An error for a picture that is too large, or has no pixels.
+    pub fn check(&self, width: u32, height: u32) -> Result<(), VisionError> {
+        if width == 0 || height == 0 {
+            return Err(VisionError::Damaged("it has no pixels".into()));
+        }
+        if width.max(height) > self.max_side || u64::from(width) * u64::from(height) > self.max_pixels {
+            let Limits { max_side, max_pixels } = *self;
+            return Err(VisionError::TooLarge { width, height, max_side, max_pixels });
+        }
+        Ok(())
+    }
+
+    /// The most bytes a file is read from: 16 a pixel, more than any kind that is read here takes uncompressed.
+    pub(crate) fn max_bytes(&self) -> u64 {
+        self.max_pixels.saturating_mul(16).saturating_add(1 << 20)
+    }
+}
+
+/// An upright, opaque photograph in sRGB bytes.
+#[derive(Clone, Debug, PartialEq)]
 pub struct Photo {
-    pixels: RgbImage,
+    rgb: RgbImage,
+    focal_35mm: Option<f64>,
+}
+
+/// A picture in linear light (sRGB primaries, 0..=1), row by row.
+#[derive(Clone, Debug, PartialEq)]
+pub struct LinearImage {
+    /// Width, pixels.
+    pub width: u32,
+    /// Height, pixels.
+    pub height: u32,
+    /// Pixels, row by row.
+    pub rgb: Vec<[f32; 3]>,
 }
 
 impl Photo {
-    /// A photograph from its pixels.
-    pub fn new(pixels: RgbImage) -> Self {
-        Photo { pixels }
+    /// A photo of sRGB pixels; an error when there are none.
+    pub fn from_rgb(rgb: RgbImage) -> Result<Self, VisionError> {
+        Limits { max_side: u32::MAX, max_pixels: u64::MAX }.check(rgb.width(), rgb.height())?;
+        Ok(Photo { rgb, focal_35mm: None })
     }
 
-    /// Decodes PNG or JPEG. The EXIF orientation is honoured, transparent pixels lie on white.
-    ///
-    /// # Errors
-    /// If the bytes are none of these, are damaged, or the picture is too large.
-    pub fn decode(bytes: &[u8], limits: &Limits) -> Result<Photo, VisionError> {
-        let image = decode(bytes, limits)?;
-        let pixels = match image.color().has_alpha() {
-            true => {
-                let mut flat = RgbImage::new(image.width(), image.height());
-                for (out, Rgba([r, g, b, a])) in flat.pixels_mut().zip(image.to_rgba8().pixels()) {
-                    let over = |c: u8| ((u32::from(c) * u32::from(*a) + 255 * (255 - u32::from(*a)) + 127) / 255) as u8;
-                    out.0 = [over(*r), over(*g), over(*b)];
-                }
-                flat
-            }
-            false => image.to_rgb8(),
-        };
-        Ok(Photo { pixels })
-    }
-
-    /// Its pixels.
-    pub fn pixels(&self) -> &RgbImage {
-        &self.pixels
-    }
-
-    /// Its width in pixels.
+    /// Width, pixels.
     pub fn width(&self) -> u32 {
-        self.pixels.width()
+        self.rgb.width()
     }
 
-    /// Its height in pixels.
+    /// Height, pixels.
     pub fn height(&self) -> u32 {
-        self.pixels.height()
+        self.rgb.height()
+    }
+
+    /// The sRGB pixels.
+    pub fn rgb(&self) -> &RgbImage {
+        &self.rgb
+    }
+
+    /// The focal length the camera wrote down, mm as on 35 mm film (a frame of 36 mm x 24 mm).
+    pub fn focal_35mm(&self) -> Option<f64> {
+        self.focal_35mm
+    }
+
+    /// The picture in linear light at `width` x `height` pixels, area-averaged.
+    pub fn linear(&self, width: u32, height: u32) -> LinearImage {
+        let table = linear_table();
+        let stride = 3 * self.rgb.width() as usize;
+        let bytes = self.rgb.as_raw();
+        let rgb = resize::resize_rows(self.rgb.dimensions(), (width, height), |j, row| {
+            let pixels = bytes.chunks_exact(stride).nth(j as usize).unwrap_or_default();
+            for (p, b) in row.iter_mut().zip(pixels.chunks_exact(3)) {
+                *p = [table[usize::from(b[0])], table[usize::from(b[1])], table[usize::from(b[2])]];
+            }
+        });
+        LinearImage { width, height, rgb }
+    }
+
+    /// The photo shrunk, in linear light, to a longer side of at most `longer` pixels; unchanged where it is smaller.
+    pub fn shrunk(&self, longer: u32) -> Photo {
+        let (width, height) = resize::fitted(self.width(), self.height(), longer);
+        if (width, height) == self.rgb.dimensions() {
+            return self.clone();
+        }
+        let linear = self.linear(width, height);
+        let mut rgb = RgbImage::new(width, height);
+        for (p, v) in rgb.pixels_mut().zip(&linear.rgb) {
+            p.0 = v.map(super::color::linear_to_byte);
+        }
+        Photo { rgb, focal_35mm: self.focal_35mm }
     }
 }
 
-/// Decodes a picture of any kind of pixel, upright.
-pub(super) fn decode(bytes: &[u8], limits: &Limits) -> Result<DynamicImage, VisionError> {
-    if bytes.is_empty() {
-        return Err(VisionError::Empty);
+/// Reads a photograph from a PNG or JPEG file.
+pub fn load(path: &Path, limits: &Limits) -> Result<Photo, VisionError> {
+    decode(&read_bytes(path, limits.max_bytes())?, limits).map_err(|e| e.in_file(path))
+}
+
+/// Reads a photograph from the bytes of a PNG or JPEG file.
+pub fn decode(bytes: &[u8], limits: &Limits) -> Result<Photo, VisionError> {
+    let (picture, focal_35mm) = decode_dynamic(bytes, limits)?;
+    Ok(Photo { rgb: over_white(picture), focal_35mm })
+}
+
+/// The decoded picture, upright, in the file's own kind of pixels, and the camera's focal length.
+pub(crate) fn decode_dynamic(bytes: &[u8], limits: &Limits) -> Result<(DynamicImage, Option<f64>), VisionError> {
+    let format = format_of(bytes)?;
+    // A PNG begins with its size; a decoder may stumble over an absurd one before it tells.
+    if let (ImageFormat::Png, Some(&[w0, w1, w2, w3, h0, h1, h2, h3])) = (format, bytes.get(16..24)) {
+        limits.check(u32::from_be_bytes([w0, w1, w2, w3]), u32::from_be_bytes([h0, h1, h2, h3]))?;
     }
-    let reader = ImageReader::new(Cursor::new(bytes)).with_guessed_format().map_err(|_| VisionError::NotAnImage)?;
-    if reader.format().is_none() {
-        return Err(VisionError::NotAnImage);
-    }
-    let mut decoder = reader.into_decoder().map_err(|e| match e {
-        image::ImageError::Unsupported(_) => VisionError::NotAnImage,
-        e => VisionError::Damaged(e.to_string()),
-    })?;
+    let mut reader = ImageReader::with_format(Cursor::new(bytes), format);
+    let mut allowed = image::Limits::no_limits();
+    allowed.max_alloc = Some(limits.max_bytes());
+    reader.limits(allowed);
+    let mut decoder = reader.into_decoder().map_err(cause)?;
     let (width, height) = decoder.dimensions();
-    let pixels = u64::from(width) * u64::from(height);
-    if width.max(height) > limits.side || pixels > limits.megapixels * 1_000_000 {
-        return Err(VisionError::TooLarge { width, height, side: limits.side, megapixels: limits.megapixels });
+    limits.check(width, height)?;
+    if format == ImageFormat::Jpeg && !jpeg_ends(bytes) {
+        return Err(VisionError::Truncated);
     }
+    // Damaged metadata are the same as none.
     let orientation = decoder.orientation().unwrap_or(image::metadata::Orientation::NoTransforms);
-    let mut image = DynamicImage::from_decoder(decoder).map_err(|e| VisionError::Damaged(e.to_string()))?;
-    image.apply_orientation(orientation);
-    Ok(image)
+    let focal = decoder.exif_metadata().ok().flatten().and_then(|chunk| exif::focal_35mm(&chunk));
+    let mut picture = DynamicImage::from_decoder(decoder).map_err(cause)?;
+    picture.apply_orientation(orientation);
+    Ok((picture, focal))
+}
+
+fn format_of(bytes: &[u8]) -> Result<ImageFormat, VisionError> {
+    const PNG: &[u8] = b"\x89PNG\r\n\x1a\n";
+    if bytes.is_empty() {
+        Err(VisionError::Empty)
+    } else if bytes.starts_with(PNG) {
+        Ok(ImageFormat::Png)
+    } else if bytes.starts_with(b"\xff\xd8\xff") {
+        Ok(ImageFormat::Jpeg)
+    } else if PNG.starts_with(bytes) || b"\xff\xd8\xff".starts_with(bytes) {
+        Err(VisionError::Truncated)
+    } else {
+        Err(VisionError::NotAnImage(match bytes {
+            [b'G', b'I', b'F', b'8', ..] => " (it is a GIF)",
+            [b'B', b'M', ..] => " (it looks like a BMP)",
+            [b'R', b'I', b'F', b'F', _, _, _, _, b'W', b'E', b'B', b'P', ..] => " (it is a WebP)",
+            [b'I', b'I', 0x2a, 0, ..] | [b'M', b'M', 0, 0x2a, ..] => " (it is a TIFF)",
+            [_, _, _, _, b'f', b't', b'y', b'p', ..] => " (it is a HEIF, AVIF or video file)",
+            _ if std::str::from_utf8(bytes).is_ok() => " (it is text)",
+            _ => "",
+        }))
+    }
+}
+
+/// Whether a JPEG file has its end marker after the start of its own first scan (thumbnails in the metadata have theirs before).
+/// The decoder fills what is missing with grey, without a word.
+fn jpeg_ends(bytes: &[u8]) -> bool {
+    let mut at = 2;
+    loop {
+        match bytes.get(at..at + 4) {
+            Some([0xff, 0xff, ..]) => at += 1,
+            Some([0xff, 0xda, ..]) => {
+                return bytes.get(at..).is_some_and(|rest| rest.windows(2).any(|w| w == [0xff, 0xd9]));
+            }
+            Some([0xff, 0x01 | 0xd0..=0xd8, ..]) => at += 2,
+            Some([0xff, _, high, low]) => at += 2 + usize::from(*high) * 256 + usize::from(*low),
+            _ => return false,
+        }
+    }
+}
+
+fn cause(error: ImageError) -> VisionError {
+    match error {
+        ImageError::IoError(e) if e.kind() == std::io::ErrorKind::UnexpectedEof => VisionError::Truncated,
+        ImageError::IoError(e) => VisionError::Io(e),
+        ImageError::Limits(_) => VisionError::Damaged("it needs more memory than a picture of an allowed size".into()),
+        other => {
+            let text = other.to_string();
+            let lower = text.to_ascii_lowercase();
+            match ["unexpected end", "end of file", "eof", "exhausted", "no more bytes"]
+                .iter()
+                .any(|s| lower.contains(s))
+            {
+                true => VisionError::Truncated,
+                false => VisionError::Damaged(text),
+            }
+        }
+    }
+}
+
+fn over_white(picture: DynamicImage) -> RgbImage {
+    match picture {
+        DynamicImage::ImageRgb8(rgb) => rgb,
+        p @ (DynamicImage::ImageLumaA8(_) | DynamicImage::ImageRgba8(_)) => {
+            let rgba = p.into_rgba8();
+            let over = |v: u8, a: u8| {
+                let (v, a) = (u32::from(v), u32::from(a));
+                ((v * a + 255 * (255 - a) + 127) / 255) as u8
+            };
+            let mut rgb = RgbImage::new(rgba.width(), rgba.height());
+            for (to, from) in rgb.pixels_mut().zip(rgba.pixels()) {
+                let [r, g, b, a] = from.0;
+                to.0 = [over(r, a), over(g, a), over(b, a)];
+            }
+            rgb
+        }
+        p @ (DynamicImage::ImageLumaA16(_) | DynamicImage::ImageRgba16(_)) => {
+            let rgba = p.into_rgba16();
+            let over = |v: u16, a: u16| {
+                let (v, a) = (u64::from(v), u64::from(a));
+                let most = 65535 * 65535;
+                ((255 * (v * a + 65535 * (65535 - a)) + most / 2) / most) as u8
+            };
+            let mut rgb = RgbImage::new(rgba.width(), rgba.height());
+            for (to, from) in rgb.pixels_mut().zip(rgba.pixels()) {
+                let [r, g, b, a] = from.0;
+                to.0 = [over(r, a), over(g, a), over(b, a)];
+            }
+            rgb
+        }
+        other => other.into_rgb8(),
+    }
 }
 
 #[cfg(test)]
-mod tests {
-    use super::*;
-    use image::{GrayImage, ImageFormat, RgbaImage};
-
-    fn png(image: impl Into<DynamicImage>) -> Vec<u8> {
-        let mut bytes = Vec::new();
-        image.into().write_to(&mut Cursor::new(&mut bytes), ImageFormat::Png).unwrap();
-        bytes
-    }
-
-    #[test]
-    fn transparent_pixels_lie_on_white() {
-        let photo =
-            Photo::decode(&png(RgbaImage::from_pixel(2, 1, Rgba([100, 0, 200, 0]))), &Limits::default()).unwrap();
-        assert_eq!(photo.pixels().get_pixel(1, 0).0, [255; 3]);
-        let half = Photo::decode(&png(RgbaImage::from_pixel(1, 1, Rgba([0, 0, 0, 128]))), &Limits::default()).unwrap();
-        assert_eq!(half.pixels().get_pixel(0, 0).0, [127; 3]);
-        let grey = Photo::decode(&png(GrayImage::from_pixel(3, 2, image::Luma([9]))), &Limits::default()).unwrap();
-        assert_eq!((grey.width(), grey.height(), grey.pixels().get_pixel(2, 1).0), (3, 2, [9; 3]));
-    }
-
-    #[test]
-    fn what_is_no_picture_is_an_error() {
-        let fails = |bytes: &[u8]| Photo::decode(bytes, &Limits::default()).unwrap_err();
-        assert_eq!(fails(b""), VisionError::Empty);
-        assert_eq!(fails(b"hello, this is text"), VisionError::NotAnImage);
-        assert_eq!(fails(b"GIF89a\x01\x00\x01\x00"), VisionError::NotAnImage);
-        let whole = png(RgbImage::from_fn(64, 64, |x, y| image::Rgb([x as u8, y as u8, (x * y) as u8])));
-        for cut in [10, 40, whole.len() / 2, whole.len() - 20] {
-            assert!(matches!(fails(&whole[..cut]), VisionError::Damaged(_)), "cut at {cut}");
-        }
-    }
-
-    #[test]
-    fn size_is_checked_before_pixels() {
-        // A PNG header that claims 60000 x 60000 pixels.
-        let mut header = png(RgbImage::new(1, 1));
-        header[16..24].copy_from_slice(&[0, 0, 0xea, 0x60, 0, 0, 0xea, 0x60]);
-        let crc = crc32(&header[12..29]).to_be_bytes();
-        header[29..33].copy_from_slice(&crc);
-        let e = Photo::decode(&header, &Limits::default()).unwrap_err();
-        assert!(matches!(e, VisionError::TooLarge { width: 60000, .. }), "{e}");
-        let wide = Photo::decode(&png(GrayImage::new(16384, 1)), &Limits::default()).unwrap();
-        assert_eq!(wide.width(), 16384);
-        assert!(Photo::decode(&png(GrayImage::new(16385, 1)), &Limits::default()).is_err());
-    }
-
-    fn crc32(bytes: &[u8]) -> u32 {
-        !bytes.iter().fold(!0u32, |c, b| {
-            (0..8).fold(c ^ u32::from(*b), |c, _| if c & 1 == 1 { 0xedb8_8320 ^ (c >> 1) } else { c >> 1 })
-        })
-    }
-}
+#[path = "photo_tests.rs"]
+mod tests;

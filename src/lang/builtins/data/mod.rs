@@ -12,7 +12,7 @@ use super::{Arg, Args, Builtin, Type, arg, function};
 use crate::geom::{Solid, obj};
 use crate::lang::error::{Fault, FaultKind};
 use crate::lang::value::Value;
-use crate::vision::{ContourMap, DepthMap, Limits, Mask, Photo, VisionError};
+use crate::vision::{ContourMap, Limits, VisionError, depth, mask, npy, photo};
 use std::sync::Arc;
 
 const SECTION: &str = "Data files";
@@ -58,13 +58,17 @@ pub fn load(kind: &str, file: &str, bytes: &[u8]) -> Result<Value, Fault> {
     let loaded = match kind {
         "csv" => csv::parse(bytes),
         "json" => json::parse(bytes),
-        "image" => Photo::decode(bytes, &limits).map(|p| Value::object(ImageValue::photo(p))).map_err(text),
-        "contours" => Photo::decode(bytes, &limits)
-            .map(|p| ContourMap::from_image(&image::DynamicImage::from(p.pixels().clone()).to_luma8()))
+        "image" => photo::decode(bytes, &limits).map(|p| Value::object(ImageValue::photo(p))).map_err(text),
+        "contours" => photo::decode(bytes, &limits)
+            .map(|p| ContourMap::from_image(&image::DynamicImage::from(p.rgb().clone()).to_luma8()))
             .map(|m| Value::object(ImageValue::contours(m, None)))
             .map_err(text),
-        "mask" => Mask::decode(bytes, &limits).map(|m| Value::object(MaskValue::new(m))).map_err(text),
-        "depth" => DepthMap::decode(bytes, 1000.0, &limits).map(|d| Value::object(DepthValue::new(d))).map_err(text),
+        "mask" => mask::decode(bytes, &limits).map(|m| Value::object(MaskValue::new(m))).map_err(text),
+        "depth" => {
+            // An array holds depths; a picture's whole numbers are thousandths.
+            let scale = if npy::is_npy(bytes) { 1.0 } else { 1000.0 };
+            depth::decode(bytes, scale, &limits).map(|d| Value::object(DepthValue::new(d))).map_err(text)
+        }
         "mesh" => {
             obj::load(bytes).map(|m| Value::object(SolidValue(Solid::new(Arc::new(m))))).map_err(|e| e.to_string())
         }

@@ -82,14 +82,15 @@ pub(super) const TABLE: &[Builtin] = &[
             SEEN,
             opt("sd", Type::Num, "0.05", "The spread of measured depths.").unit("scene units"),
             opt("outlier", Type::Num, "0.05", "The share of measurements that are off."),
-            opt("range", Type::Num, "8", "The range over which those lie.").unit("scene units"),
+            opt("near", Type::Num, "0", "The least depth such a measurement can have.").unit("scene units"),
+            opt("far", Type::Num, "100", "The greatest.").unit("scene units"),
             SIZE,
         ],
         Type::Likelihood,
         "The density of an observed depth map: normal about the rendered depth, with outliers; missing pixels say nothing.",
         |a| {
-            let options = [a.positive_or(1, 0.05)?, a.num_or(2, 0.05)?, a.positive_or(3, 8.0)?];
-            likelihood(DepthOf { view: view(a)?, size: size(a, 4)?, options })
+            let options = [a.positive_or(1, 0.05)?, a.num_or(2, 0.05)?, a.num_or(3, 0.0)?, a.num_or(4, 100.0)?];
+            likelihood(DepthOf { view: view(a)?, size: size(a, 5)?, options })
         },
     ),
 ];
@@ -237,12 +238,13 @@ impl Likelihood for MaskOf {
         let Some(mask) = observed.downcast::<MaskValue>() else {
             return Err(format!("scene.mask: the observed value must be a mask, got {}", observed.type_name()));
         };
-        same_shape((mask.mask.width, mask.mask.height), &self.view, self.name())?;
+        same_shape((mask.mask.width(), mask.mask.height()), &self.view, self.name())?;
         let frame = self.view.frame(self.size);
         let prepared = mask.prepared.get((self.eps, frame.width, frame.height), |([i, o], w, h)| {
-            MaskLikelihood::prepare(&mask.mask, *w, *h, *i, *o).map_err(|e| format!("scene.mask: {e}"))
+            MaskLikelihood::new(&mask.mask, *i, *o).map(|l| l.resized(*w, *h)).map_err(|e| format!("scene.mask: {e}"))
         })?;
-        Ok(prepared.log_likelihood(frame.mask()))
+        let rendered: Vec<bool> = frame.mask().collect();
+        prepared.log_likelihood(&rendered, frame.width, frame.height).map_err(|e| format!("scene.mask: {e}"))
     }
 }
 
@@ -250,7 +252,7 @@ impl Likelihood for MaskOf {
 struct DepthOf {
     view: Arc<View>,
     size: u32,
-    options: [f64; 3],
+    options: [f64; 4],
 }
 
 impl Likelihood for DepthOf {
@@ -262,11 +264,13 @@ impl Likelihood for DepthOf {
         let Some(depth) = observed.downcast::<DepthValue>() else {
             return Err(format!("scene.depth: the observed value must be a depth map, got {}", observed.type_name()));
         };
-        same_shape((depth.depth.width, depth.depth.height), &self.view, self.name())?;
+        same_shape((depth.depth.width(), depth.depth.height()), &self.view, self.name())?;
         let frame = self.view.frame(self.size);
-        let prepared = depth.prepared.get((self.options, frame.width, frame.height), |(options, w, h)| {
-            DepthLikelihood::prepare(&depth.depth, *w, *h, *options).map_err(|e| format!("scene.depth: {e}"))
-        })?;
-        Ok(prepared.log_likelihood(&frame.depth))
+        let prepared =
+            depth.prepared.get((self.options, frame.width, frame.height), |([sd, outlier, near, far], w, h)| {
+                let whole = DepthLikelihood::new(&depth.depth, *sd, *outlier, (*near, *far));
+                whole.map(|l| l.resized(*w, *h)).map_err(|e| format!("scene.depth: {e}"))
+            })?;
+        prepared.log_likelihood(&frame.depth, frame.width, frame.height).map_err(|e| format!("scene.depth: {e}"))
     }
 }

@@ -130,7 +130,7 @@ impl Object for MaskValue {
 pub struct DepthValue {
     /// The depth map.
     pub depth: DepthMap,
-    pub(super) prepared: Prepared<Key<[f64; 3]>, DepthLikelihood>,
+    pub(super) prepared: Prepared<Key<[f64; 4]>, DepthLikelihood>,
 }
 
 impl DepthValue {
