@@ -1,1 +1,67 @@
-//! (to be written)
+//! Probability distributions: what they draw, how they score it, the spaces their values live in.
+//!
+//! Nothing here knows of programs, traces or images. Parameters are checked when a distribution is made, so that everything after
+//! that is total: a log density is -inf off the support (a value of the wrong kind included) and never NaN.
+
+mod beta;
+mod binomial;
+mod categorical;
+mod covariance;
+mod datum;
+mod dirichlet;
+#[allow(clippy::module_inception)]
+mod dist;
+mod distribution;
+mod draw;
+mod exponential;
+mod factor;
+mod families;
+mod flip;
+mod gamma;
+mod gp;
+mod half_cauchy;
+mod half_normal;
+mod iid;
+mod lognormal;
+mod mv_normal;
+mod normal;
+mod param;
+mod poisson;
+mod product;
+mod scalar;
+mod student_t;
+mod support;
+mod transform;
+mod uniform;
+mod uniform_discrete;
+
+pub use beta::Beta;
+pub use binomial::Binomial;
+pub use categorical::Categorical;
+pub use covariance::Covariance;
+pub use datum::Datum;
+pub use dirichlet::Dirichlet;
+pub use dist::Dist;
+pub use distribution::{Distribution, Gradient};
+pub use exponential::Exponential;
+pub use families::{FAMILIES, Family, ParamDoc};
+pub use flip::Flip;
+pub use gamma::Gamma;
+pub use gp::Gp;
+pub use half_cauchy::HalfCauchy;
+pub use half_normal::HalfNormal;
+pub use iid::Iid;
+pub use lognormal::LogNormal;
+pub use mv_normal::MvNormal;
+pub use normal::Normal;
+pub use param::ParamError;
+pub use poisson::Poisson;
+pub use product::Product;
+pub use scalar::{Scalar, Slope};
+pub use student_t::StudentT;
+pub use support::{MAX_ENUMERATED, Support};
+pub use uniform::Uniform;
+pub use uniform_discrete::UniformDiscrete;
+
+#[cfg(test)]
+mod tests;

@@ -1,5 +1,7 @@
 //! Special functions, stable in log space and in the tails.
 
+use super::saddle::stirling_error;
+
 /// ln sqrt(2 pi).
 pub const LN_SQRT_2PI: f64 = 0.918_938_533_204_672_8;
 
@@ -13,16 +15,21 @@ pub fn ln_factorial(n: f64) -> f64 {
     ln_gamma(n + 1.0)
 }
 
-/// ln B(a, b).
+/// ln B(a, b) for a, b > 0.
 pub fn ln_beta(a: f64, b: f64) -> f64 {
     let (small, large) = if a < b { (a, b) } else { (b, a) };
-    if large > 1e6 && small < large * 1e-3 {
-        // Gamma(large) / Gamma(large + small) by Stirling's series, where the plain difference would cancel.
-        let s = small + large;
-        let ratio = (large - 0.5) * libm::log1p(small / large) + small * libm::log(s) - small;
-        return ln_gamma(small) - ratio + (1.0 / large - 1.0 / s) / 12.0;
+    if large < 10.0 {
+        return ln_gamma(a) + ln_gamma(b) - ln_gamma(a + b);
     }
-    ln_gamma(a) + ln_gamma(b) - ln_gamma(a + b)
+    // ln Gamma(large) - ln Gamma(large + small) by Stirling's formula, where the plain difference would cancel.
+    let sum = small + large;
+    let errors = stirling_error(large) - stirling_error(sum);
+    let ratio = if small < 10.0 {
+        ln_gamma(small) - small * libm::log(sum) + small
+    } else {
+        LN_SQRT_2PI + stirling_error(small) - 0.5 * libm::log(small) - small * libm::log1p(large / small)
+    };
+    ratio - (large - 0.5) * libm::log1p(small / large) + errors
 }
 
 /// ln of the binomial coefficient n over k.

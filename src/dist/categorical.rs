@@ -1,0 +1,81 @@
+//! An index drawn in proportion to weights.
+
+use super::{ParamError, Scalar, Slope, Support};
+use crate::rng::Stream;
+
+/// `categorical(weights)`: 0, 1, … with these weights, which need not sum to 1.
+#[derive(Clone, Debug, PartialEq)]
+pub struct Categorical {
+    weights: Box<[f64]>,
+    total: f64,
+}
+
+impl Categorical {
+    /// With these weights; fails unless all are finite and not negative, and their sum is positive and finite.
+    pub fn new(weights: &[f64]) -> Result<Categorical, ParamError> {
+        if let Some(w) = weights.iter().find(|w| !(w.is_finite() && **w >= 0.0)) {
+            return Err(ParamError::new(Self::NAME, "weights", w, "must be finite and not negative"));
+        }
+        let total: f64 = weights.iter().sum();
+        if !(total > 0.0 && total.is_finite()) {
+            return Err(ParamError::new(Self::NAME, "weights", total, "must have a positive, finite sum"));
+        }
+        Ok(Categorical { weights: weights.into(), total })
+    }
+
+    /// The probability of index `i`.
+    pub fn probability(&self, i: usize) -> f64 {
+        self.weights.get(i).map_or(0.0, |w| w / self.total)
+    }
+}
+
+impl Scalar for Categorical {
+    const NAME: &'static str = "categorical";
+
+    fn number_support(&self) -> Support {
+        Support::Integers { lo: 0, hi: Some(self.weights.len() as i64 - 1) }
+    }
+
+    fn draw(&self, rng: &mut Stream) -> f64 {
+        let mut u = rng.uniform() * self.total;
+        let mut last = 0;
+        for (i, w) in self.weights.iter().enumerate().filter(|(_, w)| **w > 0.0) {
+            last = i;
+            if u < *w {
+                break;
+            }
+            u -= w;
+        }
+        last as f64
+    }
+
+    #[inline]
+    fn log_density_num(&self, x: f64) -> f64 {
+        if !(x >= 0.0 && x == libm::trunc(x)) {
+            return f64::NEG_INFINITY;
+        }
+        match self.weights.get(x as usize) {
+            Some(w) if *w > 0.0 => libm::log(*w) - libm::log(self.total),
+            _ => f64::NEG_INFINITY,
+        }
+    }
+
+    fn slope(&self, x: f64) -> Slope {
+        let mut slope = Slope::discrete([]);
+        slope.params.extend(self.weights.iter().map(|_| -1.0 / self.total));
+        if let (Some(s), Some(w)) = (slope.params.get_mut(x as usize), self.weights.get(x as usize)) {
+            *s += 1.0 / w;
+        }
+        slope
+    }
+
+    fn number_mean(&self) -> Option<f64> {
+        Some(self.weights.iter().enumerate().map(|(i, w)| i as f64 * (w / self.total)).sum())
+    }
+
+    fn number_sd(&self) -> Option<f64> {
+        let mean = self.number_mean()?;
+        let square = |x: f64| x * x;
+        Some(self.weights.iter().enumerate().map(|(i, w)| square(i as f64 - mean) * (w / self.total)).sum::<f64>().sqrt())
+    }
+}

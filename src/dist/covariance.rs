@@ -1,0 +1,190 @@
+//! Covariance functions of one variable: the usual stationary ones, their sums and products. Not a distribution.
+
+use super::ParamError;
+use super::param::positive;
+use nalgebra::DMatrix;
+use std::fmt;
+use std::ops::{Add, Mul};
+use std::sync::Arc;
+
+/// A positive semi-definite function of two points, with variance `sd^2` at one.
+#[derive(Clone, Debug, PartialEq)]
+#[non_exhaustive]
+pub enum Covariance {
+    /// sd^2 exp(-d^2 / (2 length^2)).
+    SqExp {
+        /// Over which values stay alike, in units of the points.
+        length: f64,
+        /// The standard deviation.
+        sd: f64,
+    },
+    /// sd^2 (1 + r) exp(-r), r = sqrt(3) d / length.
+    Matern32 {
+        /// Over which values stay alike, in units of the points.
+        length: f64,
+        /// The standard deviation.
+        sd: f64,
+    },
+    /// sd^2 (1 + r + r^2 / 3) exp(-r), r = sqrt(5) d / length.
+    Matern52 {
+        /// Over which values stay alike, in units of the points.
+        length: f64,
+        /// The standard deviation.
+        sd: f64,
+    },
+    /// sd^2 exp(-2 sin^2(pi d / period) / length^2).
+    Periodic {
+        /// After which values repeat, in units of the points.
+        period: f64,
+        /// Over which values stay alike, as a fraction of about a period.
+        length: f64,
+        /// The standard deviation.
+        sd: f64,
+    },
+    /// sd^2 at one and the same point of a list, 0 between two, even if they coincide.
+    White {
+        /// The standard deviation.
+        sd: f64,
+    },
+    /// The sum of two.
+    Sum(Arc<(Covariance, Covariance)>),
+    /// The product of two.
+    Product(Arc<(Covariance, Covariance)>),
+}
+
+use Covariance::*;
+
+impl Covariance {
+    /// The squared exponential; fails unless both are positive and finite.
+    pub fn sq_exp(length: f64, sd: f64) -> Result<Covariance, ParamError> {
+        Ok(SqExp { length: positive("sq_exp", "length", length)?, sd: positive("sq_exp", "sd", sd)? })
+    }
+
+    /// Matérn's with nu = 3/2; fails unless both are positive and finite.
+    pub fn matern32(length: f64, sd: f64) -> Result<Covariance, ParamError> {
+        Ok(Matern32 { length: positive("matern32", "length", length)?, sd: positive("matern32", "sd", sd)? })
+    }
+
+    /// Matérn's with nu = 5/2; fails unless both are positive and finite.
+    pub fn matern52(length: f64, sd: f64) -> Result<Covariance, ParamError> {
+        Ok(Matern52 { length: positive("matern52", "length", length)?, sd: positive("matern52", "sd", sd)? })
+    }
+
+    /// The periodic one (MacKay 1998); fails unless all are positive and finite.
+    pub fn periodic(period: f64, length: f64, sd: f64) -> Result<Covariance, ParamError> {
+        let period = positive("periodic", "period", period)?;
+        Ok(Periodic { period, length: positive("periodic", "length", length)?, sd: positive("periodic", "sd", sd)? })
+    }
+
+    /// Independent noise; fails unless the deviation is positive and finite.
+    pub fn white(sd: f64) -> Result<Covariance, ParamError> {
+        Ok(White { sd: positive("white", "sd", sd)? })
+    }
+
+    /// The variance at a point.
+    pub fn variance(&self) -> f64 {
+        match self {
+            SqExp { sd, .. } | Matern32 { sd, .. } | Matern52 { sd, .. } | Periodic { sd, .. } | White { sd } => sd * sd,
+            Sum(two) => two.0.variance() + two.1.variance(),
+            Product(two) => two.0.variance() * two.1.variance(),
+        }
+    }
+
+    /// The covariance of two different points of a list, at this distance.
+    pub fn at_distance(&self, d: f64) -> f64 {
+        match self {
+            SqExp { length, sd } => {
+                let r = d / length;
+                sd * sd * libm::exp(-0.5 * r * r)
+            }
+            Matern32 { length, sd } => {
+                let r = (3f64.sqrt() * (d / length)).min(1e3);
+                sd * sd * (1.0 + r) * libm::exp(-r)
+            }
+            Matern52 { length, sd } => {
+                let r = (5f64.sqrt() * (d / length)).min(1e3);
+                sd * sd * (1.0 + r * (1.0 + r / 3.0)) * libm::exp(-r)
+            }
+            Periodic { period, length, sd } => {
+                // The remainder is exact, so that far points keep their phase.
+                let s = libm::sin(core::f64::consts::PI * (libm::fmod(d, *period) / period)) / length;
+                sd * sd * libm::exp(-2.0 * s * s)
+            }
+            White { .. } => 0.0,
+            Sum(two) => two.0.at_distance(d) + two.1.at_distance(d),
+            Product(two) => two.0.at_distance(d) * two.1.at_distance(d),
+        }
+    }
+
+    /// The covariance matrix of values at these points.
+    pub fn matrix(&self, at: &[f64]) -> DMatrix<f64> {
+        let packed = self.packed(at, 0.0);
+        DMatrix::from_fn(at.len(), at.len(), |i, j| {
+            let (i, j) = (i.max(j), i.min(j));
+            packed[i * (i + 1) / 2 + j]
+        })
+    }
+
+    /// Its lower triangle by rows, with so much more on the diagonal. A distance that occurs between the first point and another
+    /// is evaluated once: on a regular grid nearly all do.
+    pub(super) fn packed(&self, at: &[f64], jitter: f64) -> Vec<f64> {
+        let n = at.len();
+        let mut packed = Vec::with_capacity(n * (n + 1) / 2);
+        let mut first: Vec<(f64, f64)> = Vec::with_capacity(n);
+        let diagonal = self.variance() + jitter;
+        for i in 0..n {
+            for j in 0..i {
+                let d = (at[i] - at[j]).abs();
+                let k = match first.get(i - j) {
+                    Some((known, k)) if *known == d => *k,
+                    _ => self.at_distance(d),
+                };
+                if j == 0 {
+                    first.push((d, k));
+                }
+                packed.push(k);
+            }
+            if i == 0 {
+                first.push((0.0, f64::NAN));
+            }
+            packed.push(diagonal);
+        }
+        packed
+    }
+}
+
+impl fmt::Display for Covariance {
+    fn fmt(&self, f: &mut fmt::Formatter) -> fmt::Result {
+        match self {
+            SqExp { length, sd } => write!(f, "sq_exp(length = {length}, sd = {sd})"),
+            Matern32 { length, sd } => write!(f, "matern32(length = {length}, sd = {sd})"),
+            Matern52 { length, sd } => write!(f, "matern52(length = {length}, sd = {sd})"),
+            Periodic { period, length, sd } => write!(f, "periodic(period = {period}, length = {length}, sd = {sd})"),
+            White { sd } => write!(f, "white(sd = {sd})"),
+            Sum(two) => write!(f, "{} + {}", two.0, two.1),
+            Product(two) => {
+                for (i, part) in [&two.0, &two.1].into_iter().enumerate() {
+                    f.write_str(if i > 0 { " * " } else { "" })?;
+                    if matches!(part, Sum(_)) { write!(f, "({part})")? } else { write!(f, "{part}")? }
+                }
+                Ok(())
+            }
+        }
+    }
+}
+
+impl Add for Covariance {
+    type Output = Covariance;
+
+    fn add(self, other: Covariance) -> Covariance {
+        Sum(Arc::new((self, other)))
+    }
+}
+
+impl Mul for Covariance {
+    type Output = Covariance;
+
+    fn mul(self, other: Covariance) -> Covariance {
+        Product(Arc::new((self, other)))
+    }
+}

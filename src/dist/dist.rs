@@ -1,0 +1,163 @@
+//! Any distribution, by value: the scalar families without allocation, the others behind a pointer.
+
+use super::*;
+use crate::rng::Stream;
+use std::sync::Arc;
+
+/// A distribution of any family, at most 48 bytes.
+#[derive(Clone, Debug)]
+#[allow(missing_docs)]
+pub enum Dist {
+    Normal(Normal),
+    LogNormal(LogNormal),
+    Uniform(Uniform),
+    Beta(Beta),
+    Gamma(Gamma),
+    Exponential(Exponential),
+    HalfNormal(HalfNormal),
+    HalfCauchy(HalfCauchy),
+    StudentT(StudentT),
+    Flip(Flip),
+    UniformDiscrete(UniformDiscrete),
+    Binomial(Binomial),
+    Poisson(Poisson),
+    Categorical(Arc<Categorical>),
+    Dirichlet(Arc<Dirichlet>),
+    MvNormal(Arc<MvNormal>),
+    Gp(Arc<Gp>),
+    Iid(Arc<Iid>),
+    Product(Arc<Product>),
+    /// One that a host program brings along.
+    Custom(Arc<dyn Distribution>),
+}
+
+const _: () = assert!(size_of::<Dist>() <= 48);
+
+/// Calls the same expression for whichever family it is.
+macro_rules! each {
+    ($dist:expr, $d:ident => $body:expr) => {
+        match $dist {
+            Dist::Normal($d) => $body,
+            Dist::LogNormal($d) => $body,
+            Dist::Uniform($d) => $body,
+            Dist::Beta($d) => $body,
+            Dist::Gamma($d) => $body,
+            Dist::Exponential($d) => $body,
+            Dist::HalfNormal($d) => $body,
+            Dist::HalfCauchy($d) => $body,
+            Dist::StudentT($d) => $body,
+            Dist::Flip($d) => $body,
+            Dist::UniformDiscrete($d) => $body,
+            Dist::Binomial($d) => $body,
+            Dist::Poisson($d) => $body,
+            Dist::Categorical($d) => $body,
+            Dist::Dirichlet($d) => $body,
+            Dist::MvNormal($d) => $body,
+            Dist::Gp($d) => $body,
+            Dist::Iid($d) => $body,
+            Dist::Product($d) => $body,
+            Dist::Custom($d) => $body,
+        }
+    };
+}
+
+/// Inherent methods that forward to [`Distribution`].
+macro_rules! forward {
+    ($($(#[$doc:meta])* $name:ident($($arg:ident: $ty:ty),*) -> $out:ty;)*) => {
+        $($(#[$doc])* pub fn $name(&self, $($arg: $ty),*) -> $out { each!(self, d => d.$name($($arg),*)) })*
+    };
+}
+
+impl Dist {
+    forward! {
+        /// See [`Distribution::name`].
+        name() -> &'static str;
+        /// See [`Distribution::support`].
+        support() -> Support;
+        /// See [`Distribution::sample`].
+        sample(rng: &mut Stream) -> Datum;
+        /// See [`Distribution::log_density`].
+        #[inline]
+        log_density(x: &Datum) -> f64;
+        /// See [`Distribution::gradient`].
+        gradient(x: &Datum) -> Option<Gradient>;
+        /// See [`Distribution::is_gaussian`].
+        is_gaussian() -> bool;
+        /// See [`Distribution::whiten`].
+        whiten(x: &Datum) -> Option<Vec<f64>>;
+        /// See [`Distribution::colour`].
+        colour(z: &[f64]) -> Option<Datum>;
+        /// See [`Distribution::is_scalar`].
+        is_scalar() -> bool;
+        /// See [`Distribution::is_stored_whitened`].
+        is_stored_whitened() -> bool;
+        /// See [`Distribution::sample_stored`].
+        sample_stored(rng: &mut Stream) -> Datum;
+        /// See [`Distribution::log_density_stored`].
+        #[inline]
+        log_density_stored(s: &Datum) -> f64;
+        /// See [`Distribution::gradient_stored`].
+        gradient_stored(s: &Datum) -> Option<Gradient>;
+        /// See [`Distribution::realise`].
+        realise(s: &Datum) -> Datum;
+        /// See [`Distribution::unrealise`].
+        unrealise(value: &Datum) -> Option<Datum>;
+        /// See [`Distribution::stored_support`].
+        stored_support() -> Support;
+        /// See [`Distribution::mean`].
+        mean() -> Option<f64>;
+        /// See [`Distribution::sd`].
+        sd() -> Option<f64>;
+    }
+
+    /// The log density of a number.
+    #[inline]
+    pub fn log_density_num(&self, x: f64) -> f64 {
+        self.log_density(&Datum::Num(x))
+    }
+
+    /// The log probability of a truth value.
+    #[inline]
+    pub fn log_density_bool(&self, x: bool) -> f64 {
+        match self {
+            Dist::Flip(d) => d.log_probability(x),
+            _ => self.log_density(&Datum::Bool(x)),
+        }
+    }
+
+    /// How many independent elements it has, each a choice of its own; `None` if it is one choice.
+    pub fn elements(&self) -> Option<usize> {
+        match self {
+            Dist::Iid(d) => Some(d.len()),
+            Dist::Product(d) => Some(d.len()),
+            _ => None,
+        }
+    }
+
+    /// The distribution of element `i`; the distribution itself if it has no elements or not as many.
+    pub fn element(&self, i: usize) -> Dist {
+        match self {
+            Dist::Iid(d) => d.one().clone(),
+            Dist::Product(d) => d.parts().get(i).unwrap_or(self).clone(),
+            _ => self.clone(),
+        }
+    }
+
+    /// The log density of element `i`; -inf if there is none.
+    #[inline]
+    pub fn element_log_density(&self, i: usize, x: &Datum) -> f64 {
+        match self {
+            Dist::Iid(d) if i < d.len() => d.one().log_density(x),
+            Dist::Product(d) => d.parts().get(i).map_or(f64::NEG_INFINITY, |p| p.log_density(x)),
+            _ => f64::NEG_INFINITY,
+        }
+    }
+
+    /// The same distribution with values as its stored form: what elements of a product are.
+    pub(super) fn centred(self) -> Dist {
+        match self {
+            Dist::Gp(d) if d.is_stored_whitened() => Dist::Gp(Arc::new(d.to_centred())),
+            other => other,
+        }
+    }
+}

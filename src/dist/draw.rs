@@ -1,0 +1,54 @@
+//! Draws that several families share. All through `libm`, so that they are the same on every platform.
+
+use crate::rng::Stream;
+
+/// Brings a draw back into the doubles above 0.
+#[inline]
+pub(super) fn representable(x: f64) -> f64 {
+    x.clamp(f64::MIN_POSITIVE, f64::MAX)
+}
+
+/// The logarithm of a gamma draw with rate 1 (Marsaglia & Tsang 2000): for small shapes the draw itself would underflow.
+pub(super) fn ln_gamma_draw(shape: f64, rng: &mut Stream) -> f64 {
+    if shape < 1.0 {
+        let above = libm::log(gamma_draw(shape + 1.0, rng));
+        return above + libm::log(rng.open_uniform()) / shape;
+    }
+    libm::log(gamma_draw(shape, rng))
+}
+
+/// A gamma draw with rate 1, for shape >= 1.
+pub(super) fn gamma_draw(shape: f64, rng: &mut Stream) -> f64 {
+    let d = shape - 1.0 / 3.0;
+    let c = 1.0 / (9.0 * d).sqrt();
+    loop {
+        let x = rng.standard_normal();
+        let root = 1.0 + c * x;
+        if root <= 0.0 {
+            continue;
+        }
+        let v = root * root * root;
+        let log_u = libm::log(rng.open_uniform());
+        if log_u < 0.5 * x * x + d * (1.0 - v + libm::log(v)) {
+            return d * v;
+        }
+    }
+}
+
+/// x ln y, and 0 for x = 0 whatever y.
+#[inline]
+pub(super) fn x_log_y(x: f64, y: f64) -> f64 {
+    if x == 0.0 { 0.0 } else { x * libm::log(y) }
+}
+
+/// x ln(1 + y), and 0 for x = 0 whatever y.
+#[inline]
+pub(super) fn x_log1p_y(x: f64, y: f64) -> f64 {
+    if x == 0.0 { 0.0 } else { x * libm::log1p(y) }
+}
+
+/// ln(1 + z^2), also where the square would overflow.
+#[inline]
+pub(super) fn log1p_square(z: f64) -> f64 {
+    if z.abs() < 1e150 { libm::log1p(z * z) } else { 2.0 * libm::log(z.abs()) }
+}

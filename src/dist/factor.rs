@@ -1,0 +1,110 @@
+//! Cholesky factors: the lower triangle, packed by rows, and the few operations Gaussian vectors need. Not a matrix library.
+
+use nalgebra::DMatrix;
+
+/// A lower triangular matrix L with a positive diagonal; entry (i, j) at i (i + 1) / 2 + j.
+#[derive(Clone, Debug, PartialEq)]
+pub(super) struct Factor {
+    n: usize,
+    packed: Vec<f64>,
+    log_diagonal: f64,
+}
+
+/// Where row `i` begins.
+#[inline]
+fn row(i: usize) -> usize {
+    i * (i + 1) / 2
+}
+
+impl Factor {
+    /// The factor of the symmetric matrix with this packed lower triangle; `None` if it is not positive definite.
+    pub fn new(n: usize, mut packed: Vec<f64>) -> Option<Factor> {
+        debug_assert_eq!(packed.len(), row(n));
+        for i in 0..n {
+            let (above, rest) = packed.split_at_mut(row(i));
+            let this = &mut rest[..=i];
+            for j in 0..i {
+                let other = &above[row(j)..=row(j) + j];
+                let sum = dot(&this[..j], &other[..j]);
+                this[j] = (this[j] - sum) / other[j];
+            }
+            let pivot = this[i] - dot(&this[..i], &this[..i]);
+            if !(pivot > 0.0 && pivot.is_finite()) {
+                return None;
+            }
+            this[i] = pivot.sqrt();
+        }
+        Factor::with_sum(n, packed)
+    }
+
+    /// A matrix that is already a factor; `None` unless it is square and finite with a positive diagonal. What is above the
+    /// diagonal is not looked at.
+    pub fn from_lower(m: &DMatrix<f64>) -> Option<Factor> {
+        let packed = lower(m)?;
+        let n = m.nrows();
+        let good = packed.iter().all(|x| x.is_finite()) && (0..n).all(|i| packed[row(i) + i] > 0.0);
+        if good { Factor::with_sum(n, packed) } else { None }
+    }
+
+    fn with_sum(n: usize, packed: Vec<f64>) -> Option<Factor> {
+        let log_diagonal = (0..n).map(|i| libm::log(packed[row(i) + i])).sum();
+        Some(Factor { n, packed, log_diagonal })
+    }
+
+    pub fn size(&self) -> usize {
+        self.n
+    }
+
+    /// ln det L.
+    pub fn log_det(&self) -> f64 {
+        self.log_diagonal
+    }
+
+    /// mean + L z.
+    pub fn colour(&self, mean: &[f64], z: &[f64]) -> Vec<f64> {
+        (0..self.n).map(|i| mean[i] + dot(&self.packed[row(i)..=row(i) + i], &z[..=i])).collect()
+    }
+
+    /// L^-1 (x - mean).
+    pub fn whiten(&self, mean: &[f64], x: &[f64]) -> Vec<f64> {
+        let mut z: Vec<f64> = Vec::with_capacity(self.n);
+        for i in 0..self.n {
+            let this = &self.packed[row(i)..=row(i) + i];
+            z.push((x[i] - mean[i] - dot(&this[..i], &z)) / this[i]);
+        }
+        z
+    }
+
+    /// L^-T z.
+    pub fn solve_transposed(&self, mut z: Vec<f64>) -> Vec<f64> {
+        for i in (0..self.n).rev() {
+            let this = &self.packed[row(i)..=row(i) + i];
+            z[i] /= this[i];
+            let x = z[i];
+            z[..i].iter_mut().zip(this).for_each(|(z, l)| *z -= l * x);
+        }
+        z
+    }
+}
+
+/// The packed lower triangle of a square matrix.
+pub(super) fn lower(m: &DMatrix<f64>) -> Option<Vec<f64>> {
+    let n = m.nrows();
+    (m.ncols() == n).then(|| (0..n).flat_map(|i| (0..=i).map(move |j| m[(i, j)])).collect())
+}
+
+/// The sum of products in a fixed order with four running sums, which the compiler can do at once.
+#[inline]
+fn dot(a: &[f64], b: &[f64]) -> f64 {
+    let n = a.len().min(b.len());
+    let (a, b) = (&a[..n], &b[..n]);
+    let mut sums = [0.0; 4];
+    let (a4, b4) = (a.chunks_exact(4), b.chunks_exact(4));
+    let tail: f64 = a4.remainder().iter().zip(b4.remainder()).map(|(a, b)| a * b).sum();
+    for (a, b) in a4.zip(b4) {
+        for k in 0..4 {
+            sums[k] += a[k] * b[k];
+        }
+    }
+    (sums[0] + sums[1]) + (sums[2] + sums[3]) + tail
+}

@@ -1,0 +1,61 @@
+//! The upper half of a Cauchy distribution.
+
+use super::draw::log1p_square;
+use super::param::{finite, positive};
+use super::{ParamError, Scalar, Slope, Support};
+use crate::rng::Stream;
+
+/// `half_cauchy(location, scale)`, on [location, inf).
+#[derive(Clone, Copy, Debug, PartialEq)]
+pub struct HalfCauchy {
+    location: f64,
+    scale: f64,
+    log_norm: f64,
+}
+
+impl HalfCauchy {
+    /// From this location on, with this median distance from it; fails unless the location is finite and the scale positive
+    /// and finite.
+    pub fn new(location: f64, scale: f64) -> Result<HalfCauchy, ParamError> {
+        let (location, scale) = (finite(Self::NAME, "location", location)?, positive(Self::NAME, "scale", scale)?);
+        Ok(HalfCauchy { location, scale, log_norm: libm::log(core::f64::consts::FRAC_2_PI) - libm::log(scale) })
+    }
+}
+
+impl Scalar for HalfCauchy {
+    const NAME: &'static str = "half_cauchy";
+
+    fn number_support(&self) -> Support {
+        Support::AtLeast { lo: self.location }
+    }
+
+    fn draw(&self, rng: &mut Stream) -> f64 {
+        let x = self.location + self.scale * libm::tan(core::f64::consts::FRAC_PI_2 * rng.open_uniform());
+        x.clamp(self.location, f64::MAX)
+    }
+
+    #[inline]
+    fn log_density_num(&self, x: f64) -> f64 {
+        if x >= self.location {
+            self.log_norm - log1p_square((x - self.location) / self.scale)
+        } else {
+            f64::NEG_INFINITY
+        }
+    }
+
+    fn slope(&self, x: f64) -> Slope {
+        let z = (x - self.location) / self.scale;
+        // 2 z / (1 + z^2) and z times it, with no overflow.
+        let (once, twice) =
+            if z < 1.0 { (2.0 * z / (1.0 + z * z), 2.0 * z * z / (1.0 + z * z)) } else { (2.0 / (z + 1.0 / z), 2.0 / (1.0 + 1.0 / z / z)) };
+        Slope::new(-once / self.scale, [once / self.scale, (twice - 1.0) / self.scale])
+    }
+
+    fn number_mean(&self) -> Option<f64> {
+        None
+    }
+
+    fn number_sd(&self) -> Option<f64> {
+        None
+    }
+}

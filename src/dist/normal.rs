@@ -1,0 +1,61 @@
+//! The normal distribution.
+
+use super::param::{finite, positive};
+use super::{ParamError, Scalar, Slope, Support};
+use crate::num::LN_SQRT_2PI;
+use crate::rng::Stream;
+
+/// `normal(mean, sd)`.
+#[derive(Clone, Copy, Debug, PartialEq)]
+pub struct Normal {
+    mean: f64,
+    sd: f64,
+    log_norm: f64,
+}
+
+impl Normal {
+    /// With this mean and standard deviation; fails unless the mean is finite and the deviation positive and finite.
+    pub fn new(mean: f64, sd: f64) -> Result<Normal, ParamError> {
+        let (mean, sd) = (finite(Self::NAME, "mean", mean)?, positive(Self::NAME, "sd", sd)?);
+        Ok(Normal { mean, sd, log_norm: -libm::log(sd) - LN_SQRT_2PI })
+    }
+}
+
+impl Scalar for Normal {
+    const NAME: &'static str = "normal";
+
+    fn number_support(&self) -> Support {
+        Support::Real
+    }
+
+    fn draw(&self, rng: &mut Stream) -> f64 {
+        self.mean + self.sd * rng.standard_normal()
+    }
+
+    #[inline]
+    fn log_density_num(&self, x: f64) -> f64 {
+        let z = (x - self.mean) / self.sd;
+        if z.is_nan() { f64::NEG_INFINITY } else { self.log_norm - 0.5 * z * z }
+    }
+
+    fn slope(&self, x: f64) -> Slope {
+        let z = (x - self.mean) / self.sd;
+        Slope::new(-z / self.sd, [z / self.sd, (z * z - 1.0) / self.sd])
+    }
+
+    fn number_mean(&self) -> Option<f64> {
+        Some(self.mean)
+    }
+
+    fn number_sd(&self) -> Option<f64> {
+        Some(self.sd)
+    }
+
+    fn standardised(&self, x: f64) -> Option<f64> {
+        Some((x - self.mean) / self.sd)
+    }
+
+    fn from_standard(&self, z: f64) -> Option<f64> {
+        Some(self.mean + self.sd * z)
+    }
+}

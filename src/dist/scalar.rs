@@ -1,0 +1,119 @@
+//! Distributions of one number: a smaller interface that allocates nothing, and [`Distribution`] built on it.
+
+use super::{Datum, Distribution, Gradient, Support};
+use crate::rng::Stream;
+use smallvec::SmallVec;
+use std::fmt;
+
+/// The derivatives of the log density of a number.
+#[derive(Clone, Debug, PartialEq)]
+pub struct Slope {
+    /// By the number; `None` if it is discrete.
+    pub x: Option<f64>,
+    /// By the parameters, in the order of the constructor; 0 for integer ones.
+    pub params: SmallVec<[f64; 3]>,
+}
+
+impl Slope {
+    /// Derivatives of a continuous density.
+    pub fn new<const N: usize>(x: f64, params: [f64; N]) -> Self {
+        Slope { x: Some(x), params: SmallVec::from_slice(&params) }
+    }
+
+    /// Derivatives of a probability of an integer.
+    pub fn discrete<const N: usize>(params: [f64; N]) -> Self {
+        Slope { x: None, params: SmallVec::from_slice(&params) }
+    }
+}
+
+/// A distribution of one number.
+pub trait Scalar: fmt::Debug + Send + Sync {
+    /// The name in the language.
+    const NAME: &'static str;
+
+    /// The space of its values: one of numbers.
+    fn number_support(&self) -> Support;
+
+    /// Draws a number of the support.
+    fn draw(&self, rng: &mut Stream) -> f64;
+
+    /// The log density: -inf off the support, never NaN.
+    fn log_density_num(&self, x: f64) -> f64;
+
+    /// Its derivatives at a point where it is finite.
+    fn slope(&self, x: f64) -> Slope;
+
+    /// The mean, if it exists.
+    fn number_mean(&self) -> Option<f64>;
+
+    /// The standard deviation, if it exists.
+    fn number_sd(&self) -> Option<f64>;
+
+    /// The number's image on the standard normal's scale, for normal distributions.
+    fn standardised(&self, _x: f64) -> Option<f64> {
+        None
+    }
+
+    /// The number with this image on the standard normal's scale.
+    fn from_standard(&self, _z: f64) -> Option<f64> {
+        None
+    }
+}
+
+impl<T: Scalar> Distribution for T {
+    fn name(&self) -> &'static str {
+        T::NAME
+    }
+
+    fn support(&self) -> Support {
+        self.number_support()
+    }
+
+    fn sample(&self, rng: &mut Stream) -> Datum {
+        Datum::Num(self.draw(rng))
+    }
+
+    #[inline]
+    fn log_density(&self, x: &Datum) -> f64 {
+        match x {
+            Datum::Num(x) => self.log_density_num(*x),
+            _ => f64::NEG_INFINITY,
+        }
+    }
+
+    fn gradient(&self, x: &Datum) -> Option<Gradient> {
+        let x = x.num()?;
+        if !self.log_density_num(x).is_finite() {
+            return None;
+        }
+        let slope = self.slope(x);
+        Some(Gradient { x: slope.x.into_iter().collect(), params: slope.params.to_vec() })
+    }
+
+    fn is_scalar(&self) -> bool {
+        true
+    }
+
+    fn is_gaussian(&self) -> bool {
+        self.from_standard(0.0).is_some()
+    }
+
+    fn whiten(&self, x: &Datum) -> Option<Vec<f64>> {
+        self.standardised(x.num()?).map(|z| vec![z])
+    }
+
+    fn colour(&self, z: &[f64]) -> Option<Datum> {
+        match z {
+            [z] => self.from_standard(*z).map(Datum::Num),
+            _ => None,
+        }
+    }
+
+    fn mean(&self) -> Option<f64> {
+        self.number_mean()
+    }
+
+    fn sd(&self) -> Option<f64> {
+        self.number_sd()
+    }
+}

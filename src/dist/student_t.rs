@@ -1,0 +1,74 @@
+//! Student's t distribution, with a location and a scale.
+
+use super::draw::{ln_gamma_draw, log1p_square};
+use super::param::{finite, positive};
+use super::{ParamError, Scalar, Slope, Support};
+use crate::num::{digamma, ln_beta};
+use crate::rng::Stream;
+
+/// `student_t(df, location, scale)`.
+#[derive(Clone, Copy, Debug, PartialEq)]
+pub struct StudentT {
+    df: f64,
+    location: f64,
+    scale: f64,
+    log_norm: f64,
+}
+
+impl StudentT {
+    /// With these degrees of freedom, location and scale; fails unless the location is finite and the others positive and
+    /// finite.
+    pub fn new(df: f64, location: f64, scale: f64) -> Result<StudentT, ParamError> {
+        let df = positive(Self::NAME, "df", df)?;
+        let (location, scale) = (finite(Self::NAME, "location", location)?, positive(Self::NAME, "scale", scale)?);
+        let log_norm = -ln_beta(0.5 * df, 0.5) - 0.5 * libm::log(df) - libm::log(scale);
+        Ok(StudentT { df, location, scale, log_norm })
+    }
+}
+
+impl Scalar for StudentT {
+    const NAME: &'static str = "student_t";
+
+    fn number_support(&self) -> Support {
+        Support::Real
+    }
+
+    fn draw(&self, rng: &mut Stream) -> f64 {
+        let z = rng.standard_normal();
+        let half = 0.5 * self.df;
+        let spread = libm::exp(0.5 * (libm::log(half) - ln_gamma_draw(half, rng))).min(f64::MAX);
+        (self.location + self.scale * (z * spread)).clamp(f64::MIN, f64::MAX)
+    }
+
+    #[inline]
+    fn log_density_num(&self, x: f64) -> f64 {
+        let z = (x - self.location) / self.scale;
+        if !x.is_finite() {
+            return f64::NEG_INFINITY;
+        }
+        self.log_norm - 0.5 * (self.df + 1.0) * log1p_square(z / self.df.sqrt())
+    }
+
+    fn slope(&self, x: f64) -> Slope {
+        let (df, z) = (self.df, (x - self.location) / self.scale);
+        let t = z / df.sqrt();
+        // (df + 1) z / (df + z^2), and z times it.
+        let (once, twice) = if t.abs() < 1.0 {
+            let weight = (df + 1.0) / (df * (1.0 + t * t));
+            (weight * z, weight * z * z)
+        } else {
+            ((df + 1.0) / (z + df / z), (df + 1.0) / (1.0 + df / z / z))
+        };
+        let norm = 0.5 * (digamma(0.5 * (df + 1.0)) - digamma(0.5 * df) - 1.0 / df);
+        let by_df = norm - 0.5 * log1p_square(t) + 0.5 * twice / df;
+        Slope::new(-once / self.scale, [by_df, once / self.scale, (twice - 1.0) / self.scale])
+    }
+
+    fn number_mean(&self) -> Option<f64> {
+        (self.df > 1.0).then_some(self.location)
+    }
+
+    fn number_sd(&self) -> Option<f64> {
+        (self.df > 2.0).then(|| self.scale * (self.df / (self.df - 2.0)).sqrt())
+    }
+}
