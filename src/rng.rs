@@ -210,5 +210,6 @@ mod tests {
         assert_eq!(bits, GOLDEN, "{bits:#x?}");
     }
 
-    const GOLDEN: [u64; 4] = [0, 0, 0, 0];
+    const GOLDEN: [u64; 4] =
+        [0xbfd9147c3b1dce9e, 0xbffc04dbb2256d9a, 0x3fda26ea9e14562a, 0xbfd200e34a500ee6];
 }

@@ -1,0 +1,96 @@
+//! Log densities and special functions against a table made with 60 digits, and against statrs.
+//!
+//! Inputs are taken as doubles, so all of the difference is this crate's. The tolerance is relative to the value, with a floor for
+//! values near 0, where terms of the size of 1 to 100 have cancelled.
+
+use pcadlang::dist::*;
+use pcadlang::num;
+use std::sync::Arc;
+
+const TABLE: &str = include_str!("data/dist_reference.csv");
+
+fn made(family: &str, p: &[f64]) -> Dist {
+    match (family, p) {
+        ("normal", [a, b]) => Dist::Normal(Normal::new(*a, *b).unwrap()),
+        ("lognormal", [a, b]) => Dist::LogNormal(LogNormal::new(*a, *b).unwrap()),
+        ("uniform", [a, b]) => Dist::Uniform(Uniform::new(*a, *b).unwrap()),
+        ("beta", [a, b]) => Dist::Beta(Beta::new(*a, *b).unwrap()),
+        ("gamma", [a, b]) => Dist::Gamma(Gamma::new(*a, *b).unwrap()),
+        ("exponential", [a]) => Dist::Exponential(Exponential::new(*a).unwrap()),
+        ("half_normal", [a]) => Dist::HalfNormal(HalfNormal::new(*a).unwrap()),
+        ("half_cauchy", [a, b]) => Dist::HalfCauchy(HalfCauchy::new(*a, *b).unwrap()),
+        ("student_t", [a, b, c]) => Dist::StudentT(StudentT::new(*a, *b, *c).unwrap()),
+        ("uniform_discrete", [a, b]) => Dist::UniformDiscrete(UniformDiscrete::new(*a, *b).unwrap()),
+        ("binomial", [a, b]) => Dist::Binomial(Binomial::new(*a, *b).unwrap()),
+        ("poisson", [a]) => Dist::Poisson(Poisson::new(*a).unwrap()),
+        ("categorical", p) => Dist::Categorical(Arc::new(Categorical::new(p).unwrap())),
+        ("dirichlet", p) => Dist::Dirichlet(Arc::new(Dirichlet::new(p).unwrap())),
+        other => panic!("unknown family {other:?}"),
+    }
+}
+
+fn function(name: &str, p: &[f64]) -> f64 {
+    match (name, p) {
+        ("log_normal_cdf", [x]) => num::log_normal_cdf(*x),
+        ("digamma", [x]) => num::digamma(*x),
+        ("ln_beta", [a, b]) => num::ln_beta(*a, *b),
+        ("ln_choose", [n, k]) => num::ln_choose(*n, *k),
+        ("stirling_error", [x]) => num::stirling_error(*x),
+        ("deviance", [x, m]) => num::deviance(*x, *m),
+        other => panic!("unknown function {other:?}"),
+    }
+}
+
+/// Whether two values agree to a relative error with an absolute floor; infinities must be the same.
+fn agree(got: f64, expected: f64, relative: f64, floor: f64) -> bool {
+    got == expected || (got - expected).abs() <= relative * expected.abs() + floor
+}
+
+#[test]
+fn the_table_agrees() {
+    let mut rows = 0;
+    let mut wrong = Vec::new();
+    for line in TABLE.lines().skip(1) {
+        let fields: Vec<&str> = line.split(',').collect();
+        let [name, parameters, point, expected] = fields[..] else { panic!("bad row {line}") };
+        let p: Vec<f64> = parameters.split(' ').map(|p| p.parse().unwrap()).collect();
+        let expected: f64 = expected.parse().unwrap();
+        let (got, floor) = match name.strip_prefix("num:") {
+            Some(f) => (function(f, &p), if f == "deviance" { 0.0 } else { 5e-15 }),
+            None => {
+                let x: Vec<f64> = point.split(' ').map(|x| x.parse().unwrap()).collect();
+                let x = if let [x] = x[..] { Datum::Num(x) } else { x.into() };
+                (made(name, &p).log_density(&x), 5e-14)
+            }
+        };
+        rows += 1;
+        if !agree(got, expected, 3e-13, floor) {
+            wrong.push(format!("{line}: got {got:e}, off by {:e}", (got - expected).abs()));
+        }
+    }
+    assert!(rows > 650, "only {rows} rows");
+    assert!(wrong.is_empty(), "{} of {rows}:\n{}", wrong.len(), wrong.join("\n"));
+}
+
+#[test]
+fn statrs_agrees_on_ordinary_parameters() {
+    use statrs::distribution as s;
+    use statrs::distribution::{Continuous, Discrete};
+    let check = |d: Dist, x: f64, expected: f64| {
+        let got = d.log_density_num(x);
+        assert!(agree(got, expected, 1e-10, 1e-10), "{} at {x}: {got} against {expected}", d.name());
+    };
+    for i in 1..40u32 {
+        let x = f64::from(i) * 0.37;
+        let (u, k) = (f64::from(i) / 40.0, f64::from(i));
+        check(made("normal", &[1.0, 2.0]), x, s::Normal::new(1.0, 2.0).unwrap().ln_pdf(x));
+        check(made("lognormal", &[0.3, 0.8]), x, s::LogNormal::new(0.3, 0.8).unwrap().ln_pdf(x));
+        check(made("uniform", &[-1.0, 20.0]), x, s::Uniform::new(-1.0, 20.0).unwrap().ln_pdf(x));
+        check(made("beta", &[0.7, 3.5]), u, s::Beta::new(0.7, 3.5).unwrap().ln_pdf(u));
+        check(made("gamma", &[2.5, 1.5]), x, s::Gamma::new(2.5, 1.5).unwrap().ln_pdf(x));
+        check(made("exponential", &[0.4]), x, s::Exp::new(0.4).unwrap().ln_pdf(x));
+        check(made("student_t", &[4.0, 1.0, 2.0]), x, s::StudentsT::new(1.0, 2.0, 4.0).unwrap().ln_pdf(x));
+        check(made("binomial", &[60.0, 0.3]), k, s::Binomial::new(0.3, 60).unwrap().ln_pmf(u64::from(i)));
+        check(made("poisson", &[12.5]), k, s::Poisson::new(12.5).unwrap().ln_pmf(u64::from(i)));
+    }
+}
