@@ -8,6 +8,6 @@ mod special;
 pub use exact::ExactSum;
 pub use saddle::{deviance, stirling_error};
 pub use special::{
-    LN_SQRT_2PI, digamma, expit, inv_normal_cdf, ln_beta, ln_choose, ln_factorial, ln_gamma, log_diff_exp, log_normal_cdf,
-    log_sum_exp, log1p_exp, logit, normal_cdf,
+    LN_SQRT_2PI, digamma, expit, inv_normal_cdf, ln_beta, ln_choose, ln_factorial, ln_gamma, log_diff_exp,
+    log_normal_cdf, log_sum_exp, log1p_exp, logit, normal_cdf,
 };

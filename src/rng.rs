@@ -60,8 +60,7 @@ fn philox(mut counter: [u64; 4], mut key: [u64; 2]) -> [u64; 4] {
         }
         let a = u128::from(counter[0]) * 0xD2E7_470E_E14C_6C93;
         let b = u128::from(counter[2]) * 0xCA5A_8263_9512_1157;
-        counter =
-            [(b >> 64) as u64 ^ counter[1] ^ key[0], b as u64, (a >> 64) as u64 ^ counter[3] ^ key[1], a as u64];
+        counter = [(b >> 64) as u64 ^ counter[1] ^ key[0], b as u64, (a >> 64) as u64 ^ counter[3] ^ key[1], a as u64];
     }
     counter
 }
@@ -210,6 +209,5 @@ mod tests {
         assert_eq!(bits, GOLDEN, "{bits:#x?}");
     }
 
-    const GOLDEN: [u64; 4] =
-        [0xbfd9147c3b1dce9e, 0xbffc04dbb2256d9a, 0x3fda26ea9e14562a, 0xbfd200e34a500ee6];
+    const GOLDEN: [u64; 4] = [0xbfd9147c3b1dce9e, 0xbffc04dbb2256d9a, 0x3fda26ea9e14562a, 0xbfd200e34a500ee6];
 }

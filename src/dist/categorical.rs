@@ -76,6 +76,13 @@ impl Scalar for Categorical {
     fn number_sd(&self) -> Option<f64> {
         let mean = self.number_mean()?;
         let square = |x: f64| x * x;
-        Some(self.weights.iter().enumerate().map(|(i, w)| square(i as f64 - mean) * (w / self.total)).sum::<f64>().sqrt())
+        Some(
+            self.weights
+                .iter()
+                .enumerate()
+                .map(|(i, w)| square(i as f64 - mean) * (w / self.total))
+                .sum::<f64>()
+                .sqrt(),
+        )
     }
 }

@@ -84,7 +84,9 @@ impl Covariance {
     /// The variance at a point.
     pub fn variance(&self) -> f64 {
         match self {
-            SqExp { sd, .. } | Matern32 { sd, .. } | Matern52 { sd, .. } | Periodic { sd, .. } | White { sd } => sd * sd,
+            SqExp { sd, .. } | Matern32 { sd, .. } | Matern52 { sd, .. } | Periodic { sd, .. } | White { sd } => {
+                sd * sd
+            }
             Sum(two) => two.0.variance() + two.1.variance(),
             Product(two) => two.0.variance() * two.1.variance(),
         }

@@ -35,6 +35,13 @@ pub(super) fn gamma_draw(shape: f64, rng: &mut Stream) -> f64 {
     }
 }
 
+/// (x - location) / scale, also where the difference would overflow.
+#[inline]
+pub(super) fn standard(x: f64, location: f64, scale: f64) -> f64 {
+    let d = x - location;
+    if d.is_finite() { d / scale } else { x / scale - location / scale }
+}
+
 /// x ln y, and 0 for x = 0 whatever y.
 #[inline]
 pub(super) fn x_log_y(x: f64, y: f64) -> f64 {

@@ -1,6 +1,6 @@
 //! The upper half of a Cauchy distribution.
 
-use super::draw::log1p_square;
+use super::draw::{log1p_square, standard};
 use super::param::{finite, positive};
 use super::{ParamError, Scalar, Slope, Support};
 use crate::rng::Stream;
@@ -37,17 +37,20 @@ impl Scalar for HalfCauchy {
     #[inline]
     fn log_density_num(&self, x: f64) -> f64 {
         if x >= self.location {
-            self.log_norm - log1p_square((x - self.location) / self.scale)
+            self.log_norm - log1p_square(standard(x, self.location, self.scale))
         } else {
             f64::NEG_INFINITY
         }
     }
 
     fn slope(&self, x: f64) -> Slope {
-        let z = (x - self.location) / self.scale;
+        let z = standard(x, self.location, self.scale);
         // 2 z / (1 + z^2) and z times it, with no overflow.
-        let (once, twice) =
-            if z < 1.0 { (2.0 * z / (1.0 + z * z), 2.0 * z * z / (1.0 + z * z)) } else { (2.0 / (z + 1.0 / z), 2.0 / (1.0 + 1.0 / z / z)) };
+        let (once, twice) = if z < 1.0 {
+            (2.0 * z / (1.0 + z * z), 2.0 * z * z / (1.0 + z * z))
+        } else {
+            (2.0 / (z + 1.0 / z), 2.0 / (1.0 + 1.0 / z / z))
+        };
         Slope::new(-once / self.scale, [once / self.scale, (twice - 1.0) / self.scale])
     }
 

@@ -20,6 +20,9 @@ impl MvNormal {
     pub fn from_cov(mean: &[f64], cov: &DMatrix<f64>) -> Result<MvNormal, ParamError> {
         let size = || ParamError::new("mv_normal", "cov", shape(cov), "must be square, as large as the mean");
         let packed = lower(cov).filter(|_| cov.nrows() == mean.len()).ok_or_else(size)?;
+        if let Some(x) = cov.iter().find(|x| !x.is_finite()) {
+            return Err(ParamError::new("mv_normal", "cov", x, "must be finite"));
+        }
         let scale = cov.iter().fold(0.0, |m: f64, x| m.max(x.abs()));
         let n = mean.len();
         let symmetric = (0..n).all(|i| (0..i).all(|j| (cov[(i, j)] - cov[(j, i)]).abs() <= 1e-9 * scale));

@@ -1,5 +1,6 @@
 //! The normal distribution.
 
+use super::draw::standard;
 use super::param::{finite, positive};
 use super::{ParamError, Scalar, Slope, Support};
 use crate::num::LN_SQRT_2PI;
@@ -29,17 +30,17 @@ impl Scalar for Normal {
     }
 
     fn draw(&self, rng: &mut Stream) -> f64 {
-        self.mean + self.sd * rng.standard_normal()
+        (self.mean + self.sd * rng.standard_normal()).clamp(f64::MIN, f64::MAX)
     }
 
     #[inline]
     fn log_density_num(&self, x: f64) -> f64 {
-        let z = (x - self.mean) / self.sd;
+        let z = standard(x, self.mean, self.sd);
         if z.is_nan() { f64::NEG_INFINITY } else { self.log_norm - 0.5 * z * z }
     }
 
     fn slope(&self, x: f64) -> Slope {
-        let z = (x - self.mean) / self.sd;
+        let z = standard(x, self.mean, self.sd);
         Slope::new(-z / self.sd, [z / self.sd, (z * z - 1.0) / self.sd])
     }
 
@@ -52,10 +53,10 @@ impl Scalar for Normal {
     }
 
     fn standardised(&self, x: f64) -> Option<f64> {
-        Some((x - self.mean) / self.sd)
+        Some(standard(x, self.mean, self.sd))
     }
 
-    fn from_standard(&self, z: f64) -> Option<f64> {
+    fn unstandardised(&self, z: f64) -> Option<f64> {
         Some(self.mean + self.sd * z)
     }
 }

@@ -55,7 +55,7 @@ pub trait Scalar: fmt::Debug + Send + Sync {
     }
 
     /// The number with this image on the standard normal's scale.
-    fn from_standard(&self, _z: f64) -> Option<f64> {
+    fn unstandardised(&self, _z: f64) -> Option<f64> {
         None
     }
 }
@@ -95,7 +95,7 @@ impl<T: Scalar> Distribution for T {
     }
 
     fn is_gaussian(&self) -> bool {
-        self.from_standard(0.0).is_some()
+        self.unstandardised(0.0).is_some()
     }
 
     fn whiten(&self, x: &Datum) -> Option<Vec<f64>> {
@@ -104,7 +104,7 @@ impl<T: Scalar> Distribution for T {
 
     fn colour(&self, z: &[f64]) -> Option<Datum> {
         match z {
-            [z] => self.from_standard(*z).map(Datum::Num),
+            [z] => self.unstandardised(*z).map(Datum::Num),
             _ => None,
         }
     }

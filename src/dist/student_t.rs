@@ -1,6 +1,6 @@
 //! Student's t distribution, with a location and a scale.
 
-use super::draw::{ln_gamma_draw, log1p_square};
+use super::draw::{ln_gamma_draw, log1p_square, standard};
 use super::param::{finite, positive};
 use super::{ParamError, Scalar, Slope, Support};
 use crate::num::{digamma, ln_beta};
@@ -26,6 +26,15 @@ impl StudentT {
     }
 }
 
+impl StudentT {
+    /// ln(1 + z^2 / df).
+    #[inline]
+    fn log_tail(&self, z: f64) -> f64 {
+        let t = z / self.df.sqrt();
+        if t.is_finite() { log1p_square(t) } else { 2.0 * libm::log(z.abs()) - libm::log(self.df) }
+    }
+}
+
 impl Scalar for StudentT {
     const NAME: &'static str = "student_t";
 
@@ -42,15 +51,15 @@ impl Scalar for StudentT {
 
     #[inline]
     fn log_density_num(&self, x: f64) -> f64 {
-        let z = (x - self.location) / self.scale;
+        let z = standard(x, self.location, self.scale);
         if !x.is_finite() {
             return f64::NEG_INFINITY;
         }
-        self.log_norm - 0.5 * (self.df + 1.0) * log1p_square(z / self.df.sqrt())
+        self.log_norm - 0.5 * (self.df + 1.0) * self.log_tail(z)
     }
 
     fn slope(&self, x: f64) -> Slope {
-        let (df, z) = (self.df, (x - self.location) / self.scale);
+        let (df, z) = (self.df, standard(x, self.location, self.scale));
         let t = z / df.sqrt();
         // (df + 1) z / (df + z^2), and z times it.
         let (once, twice) = if t.abs() < 1.0 {
@@ -60,7 +69,7 @@ impl Scalar for StudentT {
             ((df + 1.0) / (z + df / z), (df + 1.0) / (1.0 + df / z / z))
         };
         let norm = 0.5 * (digamma(0.5 * (df + 1.0)) - digamma(0.5 * df) - 1.0 / df);
-        let by_df = norm - 0.5 * log1p_square(t) + 0.5 * twice / df;
+        let by_df = norm - 0.5 * self.log_tail(z) + 0.5 * twice / df;
         Slope::new(-once / self.scale, [by_df, once / self.scale, (twice - 1.0) / self.scale])
     }
 

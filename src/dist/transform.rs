@@ -10,6 +10,12 @@ use crate::num::log1p_exp;
 /// Coordinates beyond this are no longer told apart: e^-700 is near the smallest double.
 const FAR: f64 = 700.0;
 
+/// The coordinate within those told apart; 0 for NaN.
+#[inline]
+fn near(y: f64) -> f64 {
+    if y.is_nan() { 0.0 } else { y.clamp(-FAR, FAR) }
+}
+
 impl Support {
     /// The dimension of the unconstrained space; 0 for discrete values.
     pub fn free_dim(&self) -> usize {
@@ -58,17 +64,17 @@ impl Support {
         match self {
             Support::Real => (if y.is_nan() { 0.0 } else { y.clamp(f64::MIN, f64::MAX) }, 0.0),
             Support::Positive => {
-                let y = y.clamp(-FAR, FAR);
+                let y = near(y);
                 (libm::exp(y), y)
             }
             Support::AtLeast { lo } => {
-                let y = y.clamp(-FAR, FAR);
+                let y = near(y);
                 ((lo + libm::exp(y)).clamp(lo.next_up(), f64::MAX), y)
             }
             Support::Interval { lo, hi } => {
-                let (width, y) = (hi - lo, y.clamp(-FAR, FAR));
-                let near = libm::exp(-log1p_exp(y.abs()));
-                let x = if y < 0.0 { lo + width * near } else { hi - width * near };
+                let (width, y) = (hi - lo, near(y));
+                let share = libm::exp(-log1p_exp(y.abs()));
+                let x = if y < 0.0 { lo + width * share } else { hi - width * share };
                 let inside = if lo.next_up() < *hi { x.clamp(lo.next_up(), hi.next_down()) } else { *lo };
                 (inside, libm::log(width) - y.abs() - 2.0 * log1p_exp(-y.abs()))
             }
@@ -93,7 +99,10 @@ impl Support {
                 (0..*n).filter_map(|i| x.element(i)).for_each(|x| one.to_free(&x, out));
             }
             (Support::Each(all), _) => {
-                all.iter().enumerate().filter_map(|(i, s)| Some((s, x.element(i)?))).for_each(|(s, x)| s.to_free(&x, out));
+                all.iter()
+                    .enumerate()
+                    .filter_map(|(i, s)| Some((s, x.element(i)?)))
+                    .for_each(|(s, x)| s.to_free(&x, out));
             }
             (_, Datum::Num(x)) if self.free_dim() == 1 => out.push(self.to_free_scalar(*x)),
             _ => {}
@@ -143,9 +152,9 @@ impl Support {
             Support::Boolean | Support::Integers { .. } => {}
             Support::Real => out.push(by(0)),
             Support::Vector(n) => out.extend((0..*n).map(by)),
-            Support::Positive | Support::AtLeast { .. } => out.push(by(0) * libm::exp(at(0).clamp(-FAR, FAR)) + 1.0),
+            Support::Positive | Support::AtLeast { .. } => out.push(by(0) * libm::exp(near(at(0))) + 1.0),
             Support::Interval { lo, hi } => {
-                let p = crate::num::expit(at(0));
+                let p = crate::num::expit(near(at(0)));
                 out.push(by(0) * (hi - lo) * p * (1.0 - p) + 1.0 - 2.0 * p);
             }
             Support::Simplex(n) => stick_gradient(*n, at, by, out),
@@ -206,7 +215,7 @@ fn break_stick(n: usize, at: impl Fn(usize) -> f64) -> (Vec<f64>, f64) {
     let mut xs = Vec::with_capacity(n);
     let (mut log_rest, mut jacobian) = (0.0, 0.0);
     for k in 0..n.saturating_sub(1) {
-        let y = at(k).clamp(-FAR, FAR) - offset(n, k);
+        let y = near(at(k)) - offset(n, k);
         let (log_taken, log_left) = (-log1p_exp(-y), -log1p_exp(y));
         xs.push(libm::exp(log_rest + log_taken).max(f64::MIN_POSITIVE));
         jacobian += log_rest + log_taken + log_left;

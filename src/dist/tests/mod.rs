@@ -1,1 +1,49 @@
-//! Tests of the families as a whole.
+//! Tests of the families as a whole: samplers, gradients, transforms, normalisation, edges. Values of log densities are checked in
+//! `tests/dist_reference.rs`.
+
+mod edges;
+mod gaussian;
+mod gradients;
+mod normalisation;
+mod samplers;
+mod transforms;
+
+use super::*;
+use crate::rng::{Purpose, Stream, StreamKey};
+use std::sync::Arc;
+
+/// A stream of its own for each test.
+fn stream(site: u64) -> Stream {
+    StreamKey::new(20, 0, Purpose::VALUES).stream(0, site, 0)
+}
+
+/// A square matrix by rows.
+fn square(n: usize, entries: &[f64]) -> nalgebra::DMatrix<f64> {
+    nalgebra::DMatrix::from_row_slice(n, n, entries)
+}
+
+/// A distribution of numbers by name.
+fn make(family: &str, p: &[f64]) -> Dist {
+    try_make(family, p).unwrap()
+}
+
+fn try_make(family: &str, p: &[f64]) -> Result<Dist, ParamError> {
+    Ok(match family {
+        "normal" => Dist::Normal(Normal::new(p[0], p[1])?),
+        "lognormal" => Dist::LogNormal(LogNormal::new(p[0], p[1])?),
+        "uniform" => Dist::Uniform(Uniform::new(p[0], p[1])?),
+        "beta" => Dist::Beta(Beta::new(p[0], p[1])?),
+        "gamma" => Dist::Gamma(Gamma::new(p[0], p[1])?),
+        "exponential" => Dist::Exponential(Exponential::new(p[0])?),
+        "half_normal" => Dist::HalfNormal(HalfNormal::new(p[0])?),
+        "half_cauchy" => Dist::HalfCauchy(HalfCauchy::new(p[0], p[1])?),
+        "student_t" => Dist::StudentT(StudentT::new(p[0], p[1], p[2])?),
+        "flip" => Dist::Flip(Flip::new(p[0])?),
+        "uniform_discrete" => Dist::UniformDiscrete(UniformDiscrete::new(p[0], p[1])?),
+        "binomial" => Dist::Binomial(Binomial::new(p[0], p[1])?),
+        "poisson" => Dist::Poisson(Poisson::new(p[0])?),
+        "categorical" => Dist::Categorical(Arc::new(Categorical::new(p)?)),
+        "dirichlet" => Dist::Dirichlet(Arc::new(Dirichlet::new(p)?)),
+        other => panic!("no family {other}"),
+    })
+}

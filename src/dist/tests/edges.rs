@@ -1,0 +1,200 @@
+//! The ends of supports and of parameters, and values of the wrong kind.
+
+use super::*;
+
+const NEVER: f64 = f64::NEG_INFINITY;
+
+fn at(family: &str, p: &[f64], x: f64) -> f64 {
+    make(family, p).log_density_num(x)
+}
+
+#[test]
+fn poles_and_ends() {
+    assert_eq!(at("beta", &[0.01, 0.01], 0.0), f64::INFINITY);
+    assert_eq!(at("beta", &[0.01, 0.01], 1.0), f64::INFINITY);
+    assert!(at("beta", &[0.01, 0.01], 1e-300).is_finite());
+    assert!(at("beta", &[0.01, 0.01], 1f64.next_down()).is_finite());
+    assert_eq!(at("beta", &[1.0, 2.0], 0.0), 2f64.ln());
+    assert_eq!(at("beta", &[100.0, 100.0], 0.0), NEVER);
+    assert_eq!(at("gamma", &[1.0, 1.0], 0.0), NEVER);
+    assert_eq!(at("exponential", &[2.0], 0.0), 2f64.ln());
+    assert_eq!(at("uniform", &[1.0, 3.0], 1.0), -(2f64.ln()));
+    assert_eq!(at("uniform", &[1.0, 3.0], 3.0), -(2f64.ln()));
+    assert_eq!(at("uniform", &[1.0, 3.0], 1f64.next_down()), NEVER);
+    assert_eq!(at("lognormal", &[0.0, 1.0], 0.0), NEVER);
+    assert_eq!(at("lognormal", &[0.0, 1.0], f64::INFINITY), NEVER);
+    assert_eq!(at("poisson", &[0.0], 0.0), 0.0);
+    assert_eq!(at("poisson", &[0.0], 1.0), NEVER);
+    assert_eq!(at("poisson", &[3.0], 1e308), NEVER);
+    assert_eq!(make("flip", &[1.0]).log_density_bool(true), 0.0);
+    assert_eq!(make("flip", &[1.0]).log_density_bool(false), NEVER);
+    let shares = |alpha: &[f64], x: [f64; 3]| make("dirichlet", alpha).log_density(&x.to_vec().into());
+    assert_eq!(shares(&[0.5, 1.0, 2.0], [0.0, 0.5, 0.5]), f64::INFINITY);
+    assert_eq!(shares(&[0.5, 1.0, 2.0], [0.0, 1.0, 0.0]), NEVER);
+    assert_eq!(shares(&[1.0, 1.0, 1.0], [0.0, 1.0, 0.0]), 2f64.ln());
+    assert_eq!(shares(&[1.0, 1.0, 1.0], [0.3, 0.3, 0.3]), NEVER);
+}
+
+/// Distributions of every family, extreme ones among them.
+fn zoo() -> Vec<Dist> {
+    let cases: &[(&str, &[f64])] = &[
+        ("normal", &[0.0, 1.0]),
+        ("normal", &[1e308, 1e-300]),
+        ("lognormal", &[700.0, 100.0]),
+        ("uniform", &[-1e300, 1e300]),
+        ("beta", &[0.01, 0.01]),
+        ("beta", &[1e300, 1e300]),
+        ("beta", &[1e-300, 1e-300]),
+        ("gamma", &[1e-300, 1e300]),
+        ("gamma", &[1e300, 1e-300]),
+        ("exponential", &[1e-300]),
+        ("half_normal", &[1e308]),
+        ("half_cauchy", &[-1e308, 1e308]),
+        ("normal", &[-1e308, 1e308]),
+        ("student_t", &[0.5, 1e308, 1e308]),
+        ("student_t", &[1e-3, 0.0, 1.0]),
+        ("student_t", &[1e300, 1e308, 1e-300]),
+        ("flip", &[0.0]),
+        ("uniform_discrete", &[-9e15, 9e15]),
+        ("binomial", &[9e15, 0.5]),
+        ("binomial", &[9e15, 1e-300]),
+        ("poisson", &[9e15]),
+        ("poisson", &[1e-300]),
+        ("categorical", &[1e-300, 1e300]),
+        ("dirichlet", &[1e-300, 1e300, 1.0]),
+        ("dirichlet", &[2.0]),
+    ];
+    let mut all: Vec<Dist> = cases.iter().map(|(f, p)| make(f, p)).collect();
+    let parts = all[..3].to_vec();
+    all.push(Dist::Product(Arc::new(Product::new(parts).unwrap())));
+    all.push(Dist::Iid(Arc::new(Iid::new(make("normal", &[0.0, 1.0]), 3).unwrap())));
+    let identity = nalgebra::DMatrix::identity(3, 3);
+    all.push(Dist::MvNormal(Arc::new(MvNormal::from_cov(&[0.0; 3], &identity).unwrap())));
+    let gp =
+        |centred| Gp::new(vec![0.0; 3], &Covariance::sq_exp(1.0, 1.0).unwrap(), &[0.0, 1.0, 1.0], centred).unwrap();
+    all.push(Dist::Gp(Arc::new(gp(false))));
+    all.push(Dist::Gp(Arc::new(gp(true))));
+    all
+}
+
+#[test]
+fn nothing_is_ever_nan() {
+    let extremes = [0.0, -0.0, 1.0, -1.0, 0.5, 1e-320, 1e-300, 1e300, -1e300, f64::MAX, f64::MIN, 1e16, 40.0, 2.5];
+    let infinite = [f64::INFINITY, f64::NEG_INFINITY, f64::NAN];
+    for d in zoo() {
+        for x in extremes.into_iter().chain(infinite) {
+            let others = [vec![x; 3].into(), Datum::List(vec![Datum::Num(x), Datum::Num(0.5), Datum::Num(x)].into())];
+            for x in others.into_iter().chain([Datum::Num(x)]) {
+                let p = d.log_density(&x);
+                assert!(!p.is_nan(), "{d:?} at {x:?}");
+                assert!(!d.log_density_stored(&x).is_nan(), "{d:?} at {x:?}");
+                if !d.support().contains(&x) {
+                    assert_eq!(p, NEVER, "{d:?} at {x:?}");
+                }
+                if let Some(g) = d.gradient(&x) {
+                    assert!(g.x.iter().chain(&g.params).all(|g| !g.is_nan()), "{d:?} at {x:?}: {g:?}");
+                }
+            }
+        }
+        for x in infinite {
+            assert_eq!(d.log_density_num(x), NEVER, "{d:?} at {x}");
+        }
+    }
+}
+
+#[test]
+fn extreme_draws_are_in_the_support() {
+    let mut rng = stream(600);
+    for d in zoo() {
+        for _ in 0..200 {
+            let x = d.sample(&mut rng);
+            assert!(d.support().contains(&x), "{d:?} drew {x:?}");
+            let s = d.sample_stored(&mut rng);
+            assert!(d.stored_support().contains(&s) && d.log_density_stored(&s) > NEVER, "{d:?} drew {s:?}");
+        }
+    }
+}
+
+#[test]
+fn other_kinds_of_values_are_impossible() {
+    let kinds =
+        [Datum::Num(0.0), Datum::Bool(false), vec![0.25; 4].into(), Datum::List(vec![Datum::Bool(true)].into())];
+    for d in zoo() {
+        for x in &kinds {
+            if !d.support().fits(x) {
+                assert_eq!(d.log_density(x), NEVER, "{d:?} at {x:?}");
+                assert!(d.gradient(x).is_none());
+            }
+        }
+        assert!(d.support().fits(&d.sample(&mut stream(601))));
+    }
+}
+
+#[test]
+fn bad_parameters_are_errors_that_say_so() {
+    let message = |family: &str, p: &[f64]| try_make(family, p).unwrap_err().to_string();
+    assert_eq!(message("normal", &[0.0, -0.3]), "normal: sd must be positive and finite, got -0.3");
+    assert_eq!(message("uniform", &[2.0, 1.0]), "uniform: lo must be below hi, got 2 and 1");
+    assert_eq!(message("flip", &[1.5]), "flip: p must be between 0 and 1, got 1.5");
+    assert_eq!(message("categorical", &[0.0, 0.0]), "categorical: weights must have a positive, finite sum, got 0");
+    assert_eq!(message("binomial", &[2.5, 0.5]), "binomial: n must be an integer of at most 2^53, got 2.5");
+    let sizes = [
+        ("normal", 2),
+        ("lognormal", 2),
+        ("uniform", 2),
+        ("beta", 2),
+        ("gamma", 2),
+        ("exponential", 1),
+        ("half_normal", 1),
+        ("half_cauchy", 2),
+        ("student_t", 3),
+        ("flip", 1),
+        ("uniform_discrete", 2),
+        ("binomial", 2),
+        ("poisson", 1),
+        ("categorical", 2),
+        ("dirichlet", 2),
+    ];
+    for (family, n) in sizes {
+        for bad in [f64::NAN, f64::INFINITY, f64::NEG_INFINITY] {
+            for i in 0..n {
+                let mut p = vec![1.0; n];
+                p[i] = bad;
+                assert!(try_make(family, &p).is_err(), "{family}{p:?}");
+            }
+        }
+    }
+    assert!(try_make("uniform", &[-1e308, 1e308]).is_err());
+    assert!(try_make("dirichlet", &[]).is_err() && try_make("categorical", &[]).is_err());
+}
+
+#[test]
+fn finite_supports_list_their_values() {
+    let numbers = |d: &Dist| d.support().finite_values().map(|v| v.iter().filter_map(Datum::num).collect::<Vec<_>>());
+    assert_eq!(numbers(&make("binomial", &[3.0, 0.5])), Some(vec![0.0, 1.0, 2.0, 3.0]));
+    assert_eq!(numbers(&make("uniform_discrete", &[-1.0, 1.0])), Some(vec![-1.0, 0.0, 1.0]));
+    assert_eq!(numbers(&make("categorical", &[1.0, 1.0])), Some(vec![0.0, 1.0]));
+    assert_eq!(make("flip", &[0.5]).support().finite_values(), Some(vec![Datum::Bool(false), Datum::Bool(true)]));
+    for d in [make("poisson", &[1.0]), make("binomial", &[1e9, 0.5]), make("normal", &[0.0, 1.0])] {
+        assert_eq!(d.support().finite_values(), None);
+        assert!(!d.support().is_finite());
+    }
+}
+
+#[test]
+fn elements_are_distributions_of_their_own() {
+    let parts = vec![make("normal", &[0.0, 1.0]), make("flip", &[0.3])];
+    let product = Dist::Product(Arc::new(Product::new(parts.clone()).unwrap()));
+    assert_eq!(product.elements(), Some(2));
+    assert_eq!(parts[0].elements(), None);
+    let x = Datum::List(vec![Datum::Num(0.4), Datum::Bool(true)].into());
+    let sum: f64 = (0..2).map(|i| product.element_log_density(i, &x.element(i).unwrap())).sum();
+    assert_eq!(sum, product.log_density(&x));
+    assert_eq!(product.element(1).log_density_bool(true), parts[1].log_density_bool(true));
+    assert_eq!(product.element_log_density(2, &Datum::Num(0.0)), NEVER);
+    let none = Dist::Iid(Arc::new(Iid::new(parts[0].clone(), 0).unwrap()));
+    assert_eq!(none.log_density(&none.sample(&mut stream(602))), 0.0);
+    let gp = Gp::new(vec![0.0; 2], &Covariance::sq_exp(1.0, 1.0).unwrap(), &[0.0, 1.0], false).unwrap();
+    let two = Dist::Iid(Arc::new(Iid::new(Dist::Gp(Arc::new(gp)), 2).unwrap()));
+    assert!(!two.element(0).is_stored_whitened() && two.is_gaussian());
+}

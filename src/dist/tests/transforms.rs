@@ -1,0 +1,165 @@
+//! The maps to unconstrained space: round trips, Jacobians and gradients by finite differences, extreme points.
+
+use super::*;
+use nalgebra::DMatrix;
+
+fn numbers(x: &Datum) -> Vec<f64> {
+    match x {
+        Datum::Num(x) => vec![*x],
+        Datum::Vec(xs) => xs.to_vec(),
+        Datum::List(xs) => xs.iter().flat_map(numbers).collect(),
+        Datum::Bool(_) => Vec::new(),
+    }
+}
+
+fn supports() -> Vec<Support> {
+    vec![
+        Support::Real,
+        Support::Positive,
+        Support::AtLeast { lo: -3.0 },
+        Support::Interval { lo: -2.0, hi: 5.0 },
+        Support::Vector(3),
+        Support::Simplex(1),
+        Support::Simplex(2),
+        Support::Simplex(4),
+        Support::Product(Box::new(Support::Positive), 3),
+        Support::Product(Box::new(Support::Simplex(3)), 2),
+        Support::Each(
+            vec![Support::Interval { lo: 0.0, hi: 1.0 }, Support::Boolean, Support::Simplex(3), Support::Real].into(),
+        ),
+    ]
+}
+
+fn points(n: usize) -> Vec<Vec<f64>> {
+    let mut rng = stream(500);
+    (0..20).map(|_| (0..n).map(|_| 2.0 * rng.standard_normal()).collect()).collect()
+}
+
+#[test]
+fn there_and_back() {
+    for s in supports() {
+        for y in points(s.free_dim()) {
+            let (x, jacobian) = s.from_free(&y);
+            assert!(s.contains(&x) && s.fits(&x) && jacobian.is_finite(), "{s:?} {x:?}");
+            let mut back = vec![7.0];
+            s.to_free(&x, &mut back);
+            assert_eq!(back.len(), 1 + y.len());
+            assert!(y.iter().zip(&back[1..]).all(|(a, b)| (a - b).abs() < 1e-9), "{s:?}: {y:?} against {back:?}");
+        }
+    }
+}
+
+/// The coordinates that a density of `s` is by: all numbers, but for the last share of each simplex.
+fn independent(s: &Support, x: &Datum) -> Vec<f64> {
+    match (s, x) {
+        (Support::Simplex(n), x) => numbers(x)[..n - 1].to_vec(),
+        (Support::Product(one, n), x) => (0..*n).flat_map(|i| independent(one, &x.element(i).unwrap())).collect(),
+        (Support::Each(all), x) => {
+            all.iter().enumerate().flat_map(|(i, s)| independent(s, &x.element(i).unwrap())).collect()
+        }
+        _ => numbers(x),
+    }
+}
+
+#[test]
+fn jacobians_are_those_of_finite_differences() {
+    for s in supports() {
+        let n = s.free_dim();
+        for y in points(n) {
+            let column = |j: usize| {
+                let moved = |h: f64| {
+                    let mut y = y.clone();
+                    y[j] += h;
+                    independent(&s, &s.from_free(&y).0)
+                };
+                let h = 1e-5;
+                let (up, down) = (moved(h), moved(-h));
+                up.iter().zip(down).map(|(u, d)| (u - d) / (2.0 * h)).collect::<Vec<_>>()
+            };
+            let columns: Vec<Vec<f64>> = (0..n).map(column).collect();
+            let det = DMatrix::from_fn(n, n, |i, j| columns[j][i]).determinant().abs();
+            let (_, jacobian) = s.from_free(&y);
+            assert!((det.ln() - jacobian).abs() < 1e-5, "{s:?} at {y:?}: {} against {jacobian}", det.ln());
+        }
+    }
+}
+
+#[test]
+fn gradients_pull_back() {
+    // For log p = sum of sin(w_i x_i), with a weight for each number.
+    let weight = |i: usize| 0.5 + i as f64;
+    let log_p = |x: &Datum| numbers(x).iter().enumerate().map(|(i, x)| (weight(i) * x).sin()).sum::<f64>();
+    for s in supports() {
+        for y in points(s.free_dim()) {
+            let total = |y: &[f64]| {
+                let (x, jacobian) = s.from_free(y);
+                log_p(&x) + jacobian
+            };
+            let by_x: Vec<f64> = numbers(&s.from_free(&y).0)
+                .iter()
+                .enumerate()
+                .map(|(i, x)| weight(i) * (weight(i) * x).cos())
+                .collect();
+            let mut got = Vec::new();
+            s.free_gradient(&y, &by_x, &mut got);
+            assert_eq!(got.len(), y.len());
+            for j in 0..y.len() {
+                let (mut up, mut down) = (y.clone(), y.clone());
+                up[j] += 1e-6;
+                down[j] -= 1e-6;
+                let expected = (total(&up) - total(&down)) / 2e-6;
+                // Where x itself is large, the phase of the sine is what limits the difference.
+                let scale = 1.0 + expected.abs() + by_x.iter().map(|b| b.abs()).sum::<f64>();
+                assert!((got[j] - expected).abs() < 1e-4 * scale, "{s:?} at {y:?}: {} against {expected}", got[j]);
+            }
+        }
+    }
+}
+
+#[test]
+fn extreme_points_stay_finite_and_inside() {
+    for s in supports() {
+        for far in [-1e308, -1e4, -800.0, -40.0, 40.0, 800.0, 1e4, 1e308, f64::INFINITY, f64::NEG_INFINITY, f64::NAN] {
+            let (x, jacobian) = s.from_free(&vec![far; s.free_dim()]);
+            assert!(s.contains(&x) && jacobian.is_finite(), "{s:?} at {far}: {x:?}, {jacobian}");
+            let mut back = Vec::new();
+            s.to_free(&x, &mut back);
+            assert!(back.iter().all(|y| y.is_finite()), "{s:?} at {far}");
+        }
+    }
+    let unit = Support::Interval { lo: 0.0, hi: 1.0 };
+    let edges: &[(Support, f64)] = &[
+        (unit.clone(), 0.0),
+        (unit.clone(), 1.0),
+        (unit.clone(), -3.0),
+        (unit, 7.0),
+        (Support::Positive, 0.0),
+        (Support::Positive, -1.0),
+        (Support::Positive, f64::MAX),
+        (Support::AtLeast { lo: 1e20 }, 1e20),
+        (Support::AtLeast { lo: 0.0 }, f64::INFINITY),
+        (Support::Real, f64::NAN),
+    ];
+    for (s, x) in edges {
+        let y = s.to_free_scalar(*x);
+        assert!(y.is_finite(), "{s:?} at {x}: {y}");
+        assert!(s.contains_num(s.from_free_scalar(y).0), "{s:?} at {x}");
+    }
+    let mut y = Vec::new();
+    Support::Simplex(4).to_free(&vec![0.0, 1.0, 0.0, 0.0].into(), &mut y);
+    assert!(y.iter().all(|y| y.is_finite()));
+}
+
+#[test]
+fn values_that_do_not_fit_have_as_many_coordinates() {
+    for s in supports() {
+        for x in [Datum::Bool(true), Datum::Num(0.5), vec![0.5].into(), Datum::List(vec![].into())] {
+            let mut y = Vec::new();
+            s.to_free(&x, &mut y);
+            assert_eq!(y.len(), s.free_dim(), "{s:?} {x:?}");
+            if s.contains(&x) {
+                assert!(s.fits(&x));
+            }
+        }
+    }
+}
