@@ -1,0 +1,114 @@
+//! What can go wrong with a picture or an array of pixels. Messages say what was wrong with the input, in the user's words.
+
+use std::path::{Path, PathBuf};
+
+/// An error of reading or of comparing pictures.
+#[derive(Debug, thiserror::Error)]
+#[non_exhaustive]
+pub enum VisionError {
+    /// Something went wrong with a file.
+    #[error("{}: {source}", path.display())]
+    File {
+        /// The file.
+        path: PathBuf,
+        /// What went wrong.
+        source: Box<VisionError>,
+    },
+    /// The file is not there.
+    #[error("there is no such file")]
+    Missing,
+    /// The file could not be read.
+    #[error("the file cannot be read: {0}")]
+    Io(#[from] std::io::Error),
+    /// There are no bytes.
+    #[error("the file is empty")]
+    Empty,
+    /// The bytes are not those of a PNG or JPEG picture.
+    #[error("not a picture: the file does not begin as PNG or JPEG files do{0}")]
+    NotAnImage(&'static str),
+    /// The picture ends early.
+    #[error("the picture is cut short: the file ends before all of its pixels")]
+    Truncated,
+    /// The picture cannot be decoded.
+    #[error("the picture is damaged or of a kind that is not supported: {0}")]
+    Damaged(String),
+    /// The picture is larger than allowed.
+    #[error("the picture is too large: {width} x {height} pixels; at most {max_side} a side and {max_pixels} in all")]
+    TooLarge {
+        /// Width, pixels.
+        width: u32,
+        /// Height, pixels.
+        height: u32,
+        /// The longest side allowed, pixels.
+        max_side: u32,
+        /// The most pixels allowed.
+        max_pixels: u64,
+    },
+    /// The file has more bytes than any allowed picture needs.
+    #[error("the file is too large: {bytes} bytes, at most {max_bytes}")]
+    TooManyBytes {
+        /// Bytes in the file.
+        bytes: u64,
+        /// The most allowed.
+        max_bytes: u64,
+    },
+    /// A `.npy` file that cannot be used.
+    #[error("not a usable .npy array: {0}")]
+    Npy(String),
+    /// Two pictures that should be of one size are not.
+    #[error("sizes differ: expected {expected_width} x {expected_height} pixels, got {got}")]
+    Size {
+        /// Width expected, pixels.
+        expected_width: u32,
+        /// Height expected, pixels.
+        expected_height: u32,
+        /// What came instead.
+        got: String,
+    },
+    /// A parameter or a value out of its range.
+    #[error("{name} must be {rule}, not {value}")]
+    Range {
+        /// Which one.
+        name: &'static str,
+        /// What it must be.
+        rule: &'static str,
+        /// What it was.
+        value: f64,
+    },
+}
+
+impl VisionError {
+    /// The same error, with the file's name.
+    pub fn in_file(self, path: &Path) -> Self {
+        VisionError::File { path: path.to_path_buf(), source: Box::new(self) }
+    }
+
+    /// The error below the file's name.
+    pub fn cause(&self) -> &VisionError {
+        match self {
+            VisionError::File { source, .. } => source.cause(),
+            other => other,
+        }
+    }
+
+    /// Sizes that differ.
+    pub(crate) fn size(expected_width: u32, expected_height: u32, got: impl Into<String>) -> Self {
+        VisionError::Size { expected_width, expected_height, got: got.into() }
+    }
+}
+
+/// All bytes of a file, at most `max_bytes`.
+pub(crate) fn read_bytes(path: &Path, max_bytes: u64) -> Result<Vec<u8>, VisionError> {
+    let read = || {
+        let found = std::fs::metadata(path).map_err(|e| match e.kind() {
+            std::io::ErrorKind::NotFound => VisionError::Missing,
+            _ => VisionError::Io(e),
+        })?;
+        if found.len() > max_bytes {
+            return Err(VisionError::TooManyBytes { bytes: found.len(), max_bytes });
+        }
+        let bytes = std::fs::read(path)?;
+        if bytes.is_empty() { Err(VisionError::Empty) } else { Ok(bytes) }
+    };
+    read().map_err(|e: VisionError| e.in_file(path))
+}
