@@ -193,11 +193,16 @@ fn cause(error: ImageError, limits: &Limits) -> VisionError {
     match error {
         ImageError::IoError(e) if e.kind() == std::io::ErrorKind::UnexpectedEof => VisionError::Truncated,
         ImageError::IoError(e) => VisionError::Io(e),
-        ImageError::Limits(_) => VisionError::TooManyBytes { bytes: limits.max_bytes() + 1, max_bytes: limits.max_bytes() },
+        ImageError::Limits(_) => {
+            VisionError::TooManyBytes { bytes: limits.max_bytes() + 1, max_bytes: limits.max_bytes() }
+        }
         other => {
             let text = other.to_string();
             let lower = text.to_ascii_lowercase();
-            match ["unexpected end", "end of file", "eof", "exhausted", "no more bytes"].iter().any(|s| lower.contains(s)) {
+            match ["unexpected end", "end of file", "eof", "exhausted", "no more bytes"]
+                .iter()
+                .any(|s| lower.contains(s))
+            {
                 true => VisionError::Truncated,
                 false => VisionError::Damaged(text),
             }

@@ -1,0 +1,175 @@
+//! Pictures good and bad, made in memory and in a folder for temporary files.
+
+use super::*;
+use image::{GrayAlphaImage, GrayImage, ImageBuffer, Luma, LumaA, Rgb, Rgba, RgbaImage};
+
+fn encoded(picture: impl Into<DynamicImage>, format: ImageFormat) -> Vec<u8> {
+    let mut out = Cursor::new(Vec::new());
+    picture.into().write_to(&mut out, format).unwrap();
+    out.into_inner()
+}
+
+fn read(bytes: &[u8]) -> Result<Photo, VisionError> {
+    decode(bytes, &Limits::default())
+}
+
+fn colours(width: u32, height: u32) -> RgbImage {
+    RgbImage::from_fn(width, height, |i, j| {
+        Rgb([(i * 17 % 256) as u8, (j * 31 % 256) as u8, ((i + j) * 7 % 256) as u8])
+    })
+}
+
+/// A PNG chunk.
+fn chunk(kind: &[u8; 4], data: &[u8]) -> Vec<u8> {
+    let mut crc = u32::MAX;
+    for &b in kind.iter().chain(data) {
+        crc ^= u32::from(b);
+        for _ in 0..8 {
+            crc = if crc & 1 == 1 { crc >> 1 ^ 0xEDB8_8320 } else { crc >> 1 };
+        }
+    }
+    [&(data.len() as u32).to_be_bytes()[..], kind, data, &(!crc).to_be_bytes()].concat()
+}
+
+fn png_header(width: u32, height: u32) -> Vec<u8> {
+    let ihdr = [&width.to_be_bytes()[..], &height.to_be_bytes(), &[8, 2, 0, 0, 0]].concat();
+    [b"\x89PNG\r\n\x1a\n".as_slice(), &chunk(b"IHDR", &ihdr), &chunk(b"IDAT", &[0x78, 0x9c]), &chunk(b"IEND", &[])]
+        .concat()
+}
+
+#[test]
+fn every_kind_of_pixel() {
+    let rgb = colours(9, 5);
+    assert_eq!(read(&encoded(rgb.clone(), ImageFormat::Png)).unwrap().rgb(), &rgb);
+    let grey = GrayImage::from_fn(4, 3, |i, j| Luma([(i * 60 + j) as u8]));
+    let photo = read(&encoded(grey.clone(), ImageFormat::Png)).unwrap();
+    assert!(photo.rgb().pixels().zip(grey.pixels()).all(|(p, g)| p.0 == [g.0[0]; 3]));
+    let deep = ImageBuffer::<Luma<u16>, _>::from_raw(3, 1, vec![0u16, 257 * 100, 65535]).unwrap();
+    let photo = read(&encoded(deep, ImageFormat::Png)).unwrap();
+    assert_eq!(photo.rgb().as_raw()[..], [0, 0, 0, 100, 100, 100, 255, 255, 255]);
+    // Alpha lies over white.
+    let alpha = RgbaImage::from_raw(3, 1, vec![10, 20, 30, 255, 10, 20, 30, 0, 0, 0, 0, 128]).unwrap();
+    let photo = read(&encoded(alpha, ImageFormat::Png)).unwrap();
+    assert_eq!(photo.rgb().as_raw()[..], [10, 20, 30, 255, 255, 255, 127, 127, 127]);
+    let alpha = ImageBuffer::<Rgba<u16>, _>::from_raw(2, 1, vec![0u16, 65535, 0, 65535, 0, 0, 0, 32768]).unwrap();
+    let photo = read(&encoded(alpha, ImageFormat::Png)).unwrap();
+    assert_eq!(photo.rgb().as_raw()[..], [0, 255, 0, 127, 127, 127]);
+    let alpha = GrayAlphaImage::from_pixel(1, 1, LumaA([0, 51]));
+    assert_eq!(read(&encoded(alpha, ImageFormat::Png)).unwrap().rgb().as_raw()[..], [204, 204, 204]);
+    let flat = read(&encoded(RgbImage::from_pixel(20, 10, Rgb([200, 100, 50])), ImageFormat::Jpeg)).unwrap();
+    assert!(flat.rgb().pixels().all(|p| p.0.iter().zip([200u8, 100, 50]).all(|(a, b)| a.abs_diff(b) <= 3)));
+    assert!(read(&encoded(grey, ImageFormat::Jpeg)).is_ok());
+}
+
+#[test]
+fn palettes() {
+    // Two pixels of one bit: red, then green that is half transparent.
+    let ihdr = [&2u32.to_be_bytes()[..], &1u32.to_be_bytes(), &[1, 3, 0, 0, 0]].concat();
+    // zlib, one stored block: filter 0, bits 01.
+    let idat = [0x78, 0x01, 0x01, 2, 0, 0xfd, 0xff, 0, 0b0100_0000, 0, 0x42, 0, 0x41];
+    let png = [
+        b"\x89PNG\r\n\x1a\n".as_slice(),
+        &chunk(b"IHDR", &ihdr),
+        &chunk(b"PLTE", &[255, 0, 0, 0, 255, 0]),
+        &chunk(b"tRNS", &[255, 51]),
+        &chunk(b"IDAT", &idat),
+        &chunk(b"IEND", &[]),
+    ]
+    .concat();
+    assert_eq!(read(&png).unwrap().rgb().as_raw()[..], [255, 0, 0, 204, 255, 204]);
+}
+
+#[test]
+fn orientation_and_focal_length() {
+    let rgb = RgbImage::from_fn(32, 16, |i, _| if i < 16 { Rgb([255, 0, 0]) } else { Rgb([0, 0, 255]) });
+    let jpeg = encoded(rgb, ImageFormat::Jpeg);
+    let with = |orientation| {
+        let body = [b"Exif\0\0".as_slice(), &exif::chunk(orientation, 28)].concat();
+        let length = (body.len() as u16 + 2).to_be_bytes();
+        [&jpeg[..2], &[0xff, 0xe1], &length, &body, &jpeg[2..]].concat()
+    };
+    let red = |p: &Photo, x, y| p.rgb().get_pixel(x, y).0[0] > 128;
+    let photo = read(&with(1)).unwrap();
+    assert_eq!((photo.width(), photo.height(), photo.focal_35mm()), (32, 16, Some(28.0)));
+    assert!(red(&photo, 3, 8) && !red(&photo, 28, 8));
+    let photo = read(&with(3)).unwrap();
+    assert!(!red(&photo, 3, 8) && red(&photo, 28, 8));
+    // 6: turned clockwise by a quarter, so the left side comes on top.
+    let photo = read(&with(6)).unwrap();
+    assert_eq!((photo.width(), photo.height()), (16, 32));
+    assert!(red(&photo, 8, 3) && !red(&photo, 8, 28));
+    let photo = read(&with(8)).unwrap();
+    assert!(!red(&photo, 8, 3) && red(&photo, 8, 28));
+    assert_eq!(read(&with(99)).unwrap().width(), 32);
+}
+
+#[test]
+fn bad_bytes_say_what_is_wrong() {
+    assert!(matches!(read(b""), Err(VisionError::Empty)));
+    assert!(matches!(read(b"hello, I am no picture"), Err(VisionError::NotAnImage(" (it is text)"))));
+    assert!(matches!(read(b"GIF89a\x01\0"), Err(VisionError::NotAnImage(_))));
+    assert!(matches!(read(b"\x89PN"), Err(VisionError::Truncated)));
+    for format in [ImageFormat::Png, ImageFormat::Jpeg] {
+        let good = encoded(colours(40, 30), format);
+        assert!(read(&good).is_ok());
+        // The last bytes of a PNG are its end chunk, after all pixels.
+        for n in (9..good.len() - 14).step_by(good.len() / 50) {
+            let error = read(&good[..n]).unwrap_err();
+            assert!(matches!(error, VisionError::Truncated | VisionError::Damaged(_)), "{format:?} {n}: {error}");
+        }
+        let half = read(&good[..good.len() / 2]).unwrap_err();
+        assert!(matches!(half, VisionError::Truncated), "{format:?}: {half:?}");
+    }
+    // Damage in the middle never panics.
+    let good = encoded(colours(40, 30), ImageFormat::Png);
+    for at in 8..good.len() {
+        let mut bad = good.clone();
+        bad[at] ^= 0x55;
+        let _ = read(&bad);
+    }
+}
+
+#[test]
+fn size_is_checked_before_pixels() {
+    let huge = read(&png_header(60000, 60000)).unwrap_err();
+    assert!(matches!(huge, VisionError::TooLarge { width: 60000, height: 60000, .. }), "{huge}");
+    assert!(matches!(read(&png_header(16385, 1)), Err(VisionError::TooLarge { .. })));
+    assert!(matches!(read(&png_header(10001, 10000)), Err(VisionError::TooLarge { .. })));
+    assert!(matches!(read(&png_header(100, 100)), Err(VisionError::Truncated | VisionError::Damaged(_))));
+    let long = read(&encoded(colours(16384, 1), ImageFormat::Png)).unwrap();
+    assert_eq!((long.width(), long.height()), (16384, 1));
+    let small = Limits { max_side: 10, max_pixels: 50 };
+    assert!(decode(&encoded(colours(10, 5), ImageFormat::Png), &small).is_ok());
+    assert!(decode(&encoded(colours(10, 6), ImageFormat::Png), &small).is_err());
+}
+
+#[test]
+fn files() {
+    let folder = std::env::temp_dir().join(format!("pcadlang-photo-{}", std::process::id()));
+    std::fs::create_dir_all(&folder).unwrap();
+    let missing = load(&folder.join("none.png"), &Limits::default()).unwrap_err();
+    assert!(matches!(missing.cause(), VisionError::Missing));
+    assert!(missing.to_string().contains("none.png"));
+    let write = |name: &str, bytes: &[u8]| {
+        std::fs::write(folder.join(name), bytes).unwrap();
+        load(&folder.join(name), &Limits::default())
+    };
+    assert!(matches!(write("empty.png", b"").unwrap_err().cause(), VisionError::Empty));
+    assert!(matches!(write("text.png", b"some text").unwrap_err().cause(), VisionError::NotAnImage(_)));
+    // The content decides, not the name.
+    assert!(write("really_a_jpeg.png", &encoded(colours(8, 8), ImageFormat::Jpeg)).is_ok());
+    assert!(load(&folder, &Limits::default()).is_err());
+    std::fs::remove_dir_all(&folder).unwrap();
+}
+
+#[test]
+fn shrinking_is_in_linear_light() {
+    // Black and white stripes of a pixel: half the light is sRGB 188, not 128.
+    let stripes = Photo::from_rgb(RgbImage::from_fn(64, 32, |i, _| Rgb([(i % 2 * 255) as u8; 3]))).unwrap();
+    let small = stripes.shrunk(32);
+    assert_eq!((small.width(), small.height()), (32, 16));
+    assert!(small.rgb().as_raw().iter().all(|&v| v == 188));
+    assert_eq!(stripes.shrunk(64), stripes);
+    assert_eq!(stripes.linear(1, 1).rgb.len(), 1);
+    assert!(Photo::from_rgb(RgbImage::new(0, 3)).is_err());
+}

@@ -11,9 +11,7 @@ fn spans(from: u32, to: u32) -> Vec<(usize, Vec<f64>)> {
             let (a, b) = (end(i), end(i + 1));
             let first = a.floor() as usize;
             let last = (b.ceil() as usize).clamp(first + 1, from as usize);
-            let weights = (first..last)
-                .map(|s| ((b.min((s + 1) as f64) - a.max(s as f64)) / ratio).max(0.0))
-                .collect();
+            let weights = (first..last).map(|s| ((b.min((s + 1) as f64) - a.max(s as f64)) / ratio).max(0.0)).collect();
             (first, weights)
         })
         .collect()

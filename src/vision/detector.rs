@@ -1,0 +1,125 @@
+//! Contour detectors. One is built in, from gradients; others (a trained network, a file) can take its place behind the trait.
+
+use super::color::linear_to_lab;
+use super::contour_map::ContourMap;
+use super::gradient::{Gradient, colour_gradient, smoothed};
+use super::nms::{EdgePoint, hysteresis, suppress};
+use super::photo::Photo;
+use super::resize::fitted;
+
+/// Finds contours in photographs. The same photograph gives the same map, bit by bit.
+pub trait ContourDetector {
+    /// The contours of a photograph. The map may be smaller than the photograph; it has its shape.
+    fn detect(&self, photo: &Photo) -> ContourMap;
+}
+
+/// Contours as maxima of the colour gradient in L*a*b*. It knows nothing of objects: shadows and textures have edges too.
+#[derive(Clone, Copy, Debug, PartialEq)]
+pub struct GradientDetector {
+    /// Longer side of the picture worked on, pixels; smaller photographs keep their size.
+    pub size: u32,
+    /// Standard deviation of the smoothing, pixels of the picture worked on.
+    pub sigma: f32,
+    /// Points weaker than this are dropped. Thresholds are multiples of the picture's reference gradient.
+    pub low: f32,
+    /// Points stronger than this are kept, and those hanging together with them.
+    pub high: f32,
+    /// How much of the mean gradient nearby is taken off, so that textures weaken (Grigorescu, Petkov & Westenberg 2003,
+    /// "Contour detection based on nonclassical receptive field inhibition", IEEE TIP 12, 729-739); 0 for not at all.
+    pub surround: f32,
+}
+
+impl Default for GradientDetector {
+    fn default() -> Self {
+        GradientDetector { size: 256, sigma: 1.5, low: 0.2, high: 0.5, surround: 1.0 }
+    }
+}
+
+/// Gradients below this many units of L*a*b* a pixel are never contours: half a step of 8-bit grey over a pixel.
+const FLOOR: f32 = 0.2;
+/// The part of the contour points that are weaker than the reference gradient.
+const REFERENCE_QUANTILE: f64 = 0.9;
+
+impl ContourDetector for GradientDetector {
+    fn detect(&self, photo: &Photo) -> ContourMap {
+        let (width, height) = fitted(photo.width(), photo.height(), self.size);
+        let lab: Vec<[f32; 3]> = photo.linear(width, height).rgb.into_iter().map(linear_to_lab).collect();
+        let gradient = colour_gradient(width, height, &lab, self.sigma);
+        let strength = inhibited(&gradient, self.sigma, self.surround);
+        let points = suppress(&gradient, &strength, FLOOR);
+        let reference = quantile(&points, REFERENCE_QUANTILE);
+        let kept = hysteresis(width, height, &points, self.low * reference, self.high * reference);
+        ContourMap::from_points(width, height, &kept, |m| m / (m + reference))
+    }
+}
+
+/// Gradient magnitudes less `amount` times the mean magnitude in a ring around (a wide Gaussian less a narrow one, positive part,
+/// sum 1).
+fn inhibited(gradient: &Gradient, sigma: f32, amount: f32) -> Vec<f32> {
+    if amount <= 0.0 {
+        return gradient.magnitude.clone();
+    }
+    let (w, h) = (gradient.width, gradient.height);
+    let wide = smoothed(w, h, &gradient.magnitude, 4.0 * sigma);
+    let narrow = smoothed(w, h, &gradient.magnitude, sigma);
+    let ring = |(m, (a, b)): (&f32, (&f32, &f32))| (m - amount * (a - 0.25 * b).max(0.0)).max(0.0);
+    gradient.magnitude.iter().zip(wide.iter().zip(&narrow)).map(ring).collect()
+}
+
+/// The magnitude below which the given part of the points lie; 1 without points.
+fn quantile(points: &[EdgePoint], part: f64) -> f32 {
+    let mut sorted: Vec<f32> = points.iter().map(|p| p.magnitude).collect();
+    sorted.sort_by(f32::total_cmp);
+    let at = (part * sorted.len().saturating_sub(1) as f64) as usize;
+    sorted.get(at).copied().unwrap_or(1.0)
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+    use image::{Rgb, RgbImage};
+
+    fn disc(n: u32, r: f32, inside: [u8; 3], outside: [u8; 3]) -> Photo {
+        let rgb = RgbImage::from_fn(n, n, |i, j| {
+            let (x, y) = (i as f32 + 0.5 - n as f32 / 2.0, j as f32 + 0.5 - n as f32 / 2.0);
+            Rgb(if (x * x + y * y).sqrt() < r { inside } else { outside })
+        });
+        Photo::from_rgb(rgb).unwrap()
+    }
+
+    #[test]
+    fn discs_have_their_circle() {
+        // The last one differs in colour only.
+        for (a, b) in [([255, 255, 255], [0, 0, 0]), ([90, 90, 90], [120, 120, 120]), ([170, 60, 60], [0, 111, 111])] {
+            let map = GradientDetector::default().detect(&disc(512, 160.0, a, b));
+            assert_eq!((map.width, map.height), (256, 256));
+            assert!((450..=700).contains(&map.len()), "{}", map.len());
+            for k in 0..map.len() {
+                let (x, y) = (map.x[k] - 128.0, map.y[k] - 128.0);
+                let r = (x * x + y * y).sqrt();
+                assert!((r - 80.0).abs() < 0.6, "{r}");
+                assert!(((map.tx[k] * x + map.ty[k] * y) / r).abs() < 0.15);
+                assert!((0.0..=1.0).contains(&map.strength[k]));
+            }
+        }
+    }
+
+    #[test]
+    fn flat_and_tiny_pictures_have_no_contours() {
+        let detector = GradientDetector::default();
+        assert!(detector.detect(&disc(100, 0.0, [9; 3], [200; 3])).is_empty());
+        for (w, h) in [(1, 1), (1, 300), (300, 1)] {
+            let photo = Photo::from_rgb(RgbImage::from_pixel(w, h, Rgb([5, 90, 200]))).unwrap();
+            assert!(detector.detect(&photo).is_empty());
+        }
+    }
+
+    #[test]
+    fn brightness_does_not_matter() {
+        let strong = GradientDetector::default().detect(&disc(200, 60.0, [255; 3], [60; 3]));
+        let weak = GradientDetector::default().detect(&disc(200, 60.0, [120; 3], [100; 3]));
+        let common =
+            weak.to_image().pixels().zip(strong.to_image().pixels()).filter(|(a, b)| a.0[0] > 0 && b.0[0] > 0).count();
+        assert!(common * 10 > 8 * strong.len(), "{common} {}", strong.len());
+    }
+}

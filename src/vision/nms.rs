@@ -1,0 +1,144 @@
+//! Thin contours out of a gradient: suppression of what is not a maximum along the gradient's direction, with places finer than
+//! a pixel, and hysteresis (Canny 1986, "A computational approach to edge detection", PAMI 8, 679-698).
+
+use super::gradient::Gradient;
+
+/// A maximum of the gradient along its direction.
+#[derive(Clone, Copy, Debug, PartialEq)]
+pub struct EdgePoint {
+    /// The pixel it was found in (row * width + column).
+    pub pixel: usize,
+    /// Column, pixels (pixel centres at +0.5).
+    pub x: f32,
+    /// Row, pixels (pixel centres at +0.5).
+    pub y: f32,
+    /// Unit vector across the contour.
+    pub normal: [f32; 2],
+    /// Gradient magnitude of the pixel.
+    pub magnitude: f32,
+}
+
+/// Bilinear value at a place counted from the first pixel's centre, clamped to the picture.
+fn bilinear(width: usize, height: usize, data: &[f32], x: f32, y: f32) -> f32 {
+    let (x, y) = (x.clamp(0.0, (width - 1) as f32), y.clamp(0.0, (height - 1) as f32));
+    let (i, j) = (x as usize, y as usize);
+    let (i1, j1) = ((i + 1).min(width - 1), (j + 1).min(height - 1));
+    let (fx, fy) = (x - i as f32, y - j as f32);
+    let top = data[j * width + i] * (1.0 - fx) + data[j * width + i1] * fx;
+    let bottom = data[j1 * width + i] * (1.0 - fx) + data[j1 * width + i1] * fx;
+    top * (1.0 - fy) + bottom * fy
+}
+
+/// The peak, in steps from the middle, of the parabola through three values a step apart; within half a step.
+pub fn parabola_peak(before: f32, middle: f32, after: f32) -> f32 {
+    let bend = before - 2.0 * middle + after;
+    if bend < 0.0 { (0.5 * (before - after) / bend).clamp(-0.5, 0.5) } else { 0.0 }
+}
+
+/// Offset of a ridge of `data` from the centre of a pixel along a unit normal, pixels, within half a pixel.
+pub fn ridge_offset(width: u32, height: u32, data: &[f32], pixel: usize, normal: [f32; 2]) -> f32 {
+    let (w, h) = (width as usize, height as usize);
+    let (x, y) = ((pixel % w) as f32, (pixel / w) as f32);
+    let at = |t: f32| bilinear(w, h, data, x + t * normal[0], y + t * normal[1]);
+    parabola_peak(at(-1.0), at(0.0), at(1.0))
+}
+
+/// All maxima with a magnitude above `floor`, in raster order. `strength` takes the place of the gradient's magnitude.
+pub fn suppress(gradient: &Gradient, strength: &[f32], floor: f32) -> Vec<EdgePoint> {
+    let (w, h) = (gradient.width as usize, gradient.height as usize);
+    let mut out = Vec::new();
+    for (pixel, (&m, &normal)) in strength.iter().zip(&gradient.normal).enumerate().take(w * h) {
+        if m.is_nan() || m <= floor {
+            continue;
+        }
+        let (x, y) = ((pixel % w) as f32, (pixel / w) as f32);
+        let at = |t: f32| bilinear(w, h, strength, x + t * normal[0], y + t * normal[1]);
+        let (before, after) = (at(-1.0), at(1.0));
+        // One of the two may be equal: a maximum between two pixels is found once.
+        if m > before && m >= after {
+            let t = parabola_peak(before, m, after);
+            let (px, py) = (x + 0.5 + t * normal[0], y + 0.5 + t * normal[1]);
+            let (px, py) = (px.clamp(0.0, w as f32), py.clamp(0.0, h as f32));
+            out.push(EdgePoint { pixel, x: px, y: py, normal, magnitude: m });
+        }
+    }
+    out
+}
+
+/// The points of at least `low` that hang together (8 neighbours) with one of at least `high`, in the given order.
+pub fn hysteresis(width: u32, height: u32, points: &[EdgePoint], low: f32, high: f32) -> Vec<EdgePoint> {
+    let (w, h) = (width as usize, height as usize);
+    let mut kept = vec![0u8; w * h];
+    for p in points.iter().filter(|p| p.magnitude >= low) {
+        kept[p.pixel] = 1;
+    }
+    let mut todo: Vec<usize> = points.iter().filter(|p| p.magnitude >= high.max(low)).map(|p| p.pixel).collect();
+    todo.iter().for_each(|&k| kept[k] = 2);
+    while let Some(k) = todo.pop() {
+        let (x, y) = (k % w, k / w);
+        for j in y.saturating_sub(1)..(y + 2).min(h) {
+            for i in x.saturating_sub(1)..(x + 2).min(w) {
+                if kept[j * w + i] == 1 {
+                    kept[j * w + i] = 2;
+                    todo.push(j * w + i);
+                }
+            }
+        }
+    }
+    points.iter().filter(|p| kept[p.pixel] == 2).copied().collect()
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+    use crate::vision::gradient::colour_gradient;
+
+    /// A picture bright beyond the line `x cos a + y sin a = d`, with exact areas to 1/16.
+    fn half_plane(n: usize, angle: f32, d: f32) -> Vec<[f32; 1]> {
+        let (c, s) = (libm::cosf(angle), libm::sinf(angle));
+        (0..n * n)
+            .map(|k| {
+                let inside = (0..256).filter(|q| {
+                    let x = (k % n) as f32 + ((q % 16) as f32 + 0.5) / 16.0;
+                    let y = (k / n) as f32 + ((q / 16) as f32 + 0.5) / 16.0;
+                    x * c + y * s > d
+                });
+                [inside.count() as f32 / 2.56]
+            })
+            .collect()
+    }
+
+    #[test]
+    fn straight_edges_are_found_where_they_are() {
+        for (angle, d) in [(0.0f32, 20.0), (0.0, 20.3), (0.4, 26.7), (0.785, 30.1), (1.2, 25.5), (1.5708, 19.8)] {
+            let g = colour_gradient(40, 40, &half_plane(40, angle, d), 1.0);
+            let points = suppress(&g, &g.magnitude, 5.0);
+            let (c, s) = (libm::cosf(angle), libm::sinf(angle));
+            let inner: Vec<_> =
+                points.iter().filter(|p| (5.0..35.0).contains(&p.x) && (5.0..35.0).contains(&p.y)).collect();
+            assert!(inner.len() >= 25, "{angle}: {}", inner.len());
+            for p in inner {
+                assert!((p.x * c + p.y * s - d).abs() < 0.12, "{angle} {d}: {p:?}");
+                assert!((p.normal[0] * c + p.normal[1] * s).abs() > 0.995);
+            }
+        }
+    }
+
+    #[test]
+    fn hysteresis_follows_weak_points_from_strong_ones() {
+        let point = |pixel, magnitude| EdgePoint { pixel, x: 0.0, y: 0.0, normal: [1.0, 0.0], magnitude };
+        // A row of ten: strong, weak, weak, none, weak, too weak, strong.
+        let row = [point(0, 9.0), point(1, 3.0), point(2, 3.0), point(4, 3.0), point(5, 1.0), point(6, 9.0)];
+        let kept: Vec<usize> = hysteresis(10, 1, &row, 2.0, 8.0).iter().map(|p| p.pixel).collect();
+        assert_eq!(kept, [0, 1, 2, 6]);
+    }
+
+    #[test]
+    fn peaks() {
+        assert_eq!(parabola_peak(1.0, 2.0, 1.0), 0.0);
+        // -(t - 0.25)^2
+        let f = |t: f32| -(t - 0.25) * (t - 0.25);
+        assert!((parabola_peak(f(-1.0), f(0.0), f(1.0)) - 0.25).abs() < 1e-6);
+        assert_eq!(parabola_peak(1.0, 1.0, 1.0), 0.0);
+    }
+}
