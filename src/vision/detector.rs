@@ -2,7 +2,7 @@
 
 use super::color::linear_to_lab;
 use super::contour_map::ContourMap;
-use super::gradient::{Gradient, colour_gradient, smoothed};
+use super::gradient::colour_gradient;
 use super::nms::{EdgePoint, hysteresis, suppress};
 use super::photo::Photo;
 use super::resize::fitted;
@@ -24,14 +24,11 @@ pub struct GradientDetector {
     pub low: f32,
     /// Points stronger than this are kept, and those hanging together with them.
     pub high: f32,
-    /// How much of the mean gradient nearby is taken off, so that textures weaken (Grigorescu, Petkov & Westenberg 2003,
-    /// "Contour detection based on nonclassical receptive field inhibition", IEEE TIP 12, 729-739); 0 for not at all.
-    pub surround: f32,
 }
 
 impl Default for GradientDetector {
     fn default() -> Self {
-        GradientDetector { size: 256, sigma: 1.5, low: 0.2, high: 0.5, surround: 1.0 }
+        GradientDetector { size: 256, sigma: 1.5, low: 0.2, high: 0.5 }
     }
 }
 
@@ -45,25 +42,11 @@ impl ContourDetector for GradientDetector {
         let (width, height) = fitted(photo.width(), photo.height(), self.size);
         let lab: Vec<[f32; 3]> = photo.linear(width, height).rgb.into_iter().map(linear_to_lab).collect();
         let gradient = colour_gradient(width, height, &lab, self.sigma);
-        let strength = inhibited(&gradient, self.sigma, self.surround);
-        let points = suppress(&gradient, &strength, FLOOR);
+        let points = suppress(&gradient, FLOOR);
         let reference = quantile(&points, REFERENCE_QUANTILE);
         let kept = hysteresis(width, height, &points, self.low * reference, self.high * reference);
         ContourMap::from_points(width, height, &kept, |m| m / (m + reference))
     }
-}
-
-/// Gradient magnitudes less `amount` times the mean magnitude in a ring around (a wide Gaussian less a narrow one, positive part,
-/// sum 1).
-fn inhibited(gradient: &Gradient, sigma: f32, amount: f32) -> Vec<f32> {
-    if amount <= 0.0 {
-        return gradient.magnitude.clone();
-    }
-    let (w, h) = (gradient.width, gradient.height);
-    let wide = smoothed(w, h, &gradient.magnitude, 4.0 * sigma);
-    let narrow = smoothed(w, h, &gradient.magnitude, sigma);
-    let ring = |(m, (a, b)): (&f32, (&f32, &f32))| (m - amount * (a - 0.25 * b).max(0.0)).max(0.0);
-    gradient.magnitude.iter().zip(wide.iter().zip(&narrow)).map(ring).collect()
 }
 
 /// The magnitude below which the given part of the points lie; 1 without points.

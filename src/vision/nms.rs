@@ -48,9 +48,10 @@ pub fn ridge_offset(width: u32, height: u32, data: &[f32], pixel: usize, normal:
     if bend < 0.0 { (-slope / bend).clamp(-0.7, 0.7) } else { 0.0 }
 }
 
-/// All maxima with a magnitude above `floor`, in raster order. `strength` takes the place of the gradient's magnitude.
-pub fn suppress(gradient: &Gradient, strength: &[f32], floor: f32) -> Vec<EdgePoint> {
+/// All maxima with a magnitude above `floor`, in raster order.
+pub fn suppress(gradient: &Gradient, floor: f32) -> Vec<EdgePoint> {
     let (w, h) = (gradient.width as usize, gradient.height as usize);
+    let strength = &gradient.magnitude;
     let mut out = Vec::new();
     for (pixel, (&m, &normal)) in strength.iter().zip(&gradient.normal).enumerate().take(w * h) {
         if m.is_nan() || m <= floor {
@@ -117,7 +118,7 @@ mod tests {
     fn straight_edges_are_found_where_they_are() {
         for (angle, d) in [(0.0f32, 20.0), (0.0, 20.3), (0.4, 26.7), (0.785, 30.1), (1.2, 25.5), (1.5708, 19.8)] {
             let g = colour_gradient(40, 40, &half_plane(40, angle, d), 1.0);
-            let points = suppress(&g, &g.magnitude, 5.0);
+            let points = suppress(&g, 5.0);
             let (c, s) = (libm::cosf(angle), libm::sinf(angle));
             let inner: Vec<_> =
                 points.iter().filter(|p| (5.0..35.0).contains(&p.x) && (5.0..35.0).contains(&p.y)).collect();
