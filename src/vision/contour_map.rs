@@ -60,7 +60,7 @@ impl ContourMap {
 
     /// A ready contour map (bright = contour, 255 = strength 1). Lines thicker than a pixel are thinned to their strongest, else
     /// middle, pixels; tangents come from the strengths within about three pixels; points lie between pixels where the
-    /// brightness says so.
+    /// brightness says so. Areas, which are not contours, shrink to lines in their middle.
     pub fn from_image(picture: &GrayImage) -> Self {
         let (width, height) = picture.dimensions();
         let mut map = ContourMap::new(width, height);

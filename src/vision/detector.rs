@@ -28,7 +28,7 @@ pub struct GradientDetector {
 
 impl Default for GradientDetector {
     fn default() -> Self {
-        GradientDetector { size: 256, sigma: 1.5, low: 0.2, high: 0.5 }
+        GradientDetector { size: 256, sigma: 1.6, low: 0.2, high: 0.5 }
     }
 }
 
@@ -36,17 +36,28 @@ impl Default for GradientDetector {
 const FLOOR: f32 = 0.2;
 /// The part of the contour points that are weaker than the reference gradient.
 const REFERENCE_QUANTILE: f64 = 0.9;
+/// Reference gradient of a common photograph, units of L*a*b* a pixel. The reference is the geometric mean of this and the
+/// picture's own, so that a picture of weak edges alone keeps them, but as weaker ones.
+const COMMON_REFERENCE: f32 = 4.0;
+/// How much more than lightness colour counts: shading and texture change lightness, other objects change colour.
+const COLOUR_WEIGHT: f32 = 2.0;
 
 impl ContourDetector for GradientDetector {
     fn detect(&self, photo: &Photo) -> ContourMap {
         let (width, height) = fitted(photo.width(), photo.height(), self.size);
-        let lab: Vec<[f32; 3]> = photo.linear(width, height).rgb.into_iter().map(linear_to_lab).collect();
+        let lab: Vec<[f32; 3]> = photo.linear(width, height).rgb.into_iter().map(weighted_lab).collect();
         let gradient = colour_gradient(width, height, &lab, self.sigma);
         let points = suppress(&gradient, FLOOR);
-        let reference = quantile(&points, REFERENCE_QUANTILE);
+        let reference = (quantile(&points, REFERENCE_QUANTILE) * COMMON_REFERENCE).sqrt();
         let kept = hysteresis(width, height, &points, self.low * reference, self.high * reference);
         ContourMap::from_points(width, height, &kept, |m| m / (m + reference))
     }
+}
+
+/// L*, a*, b* with the weight of colour.
+fn weighted_lab(linear: [f32; 3]) -> [f32; 3] {
+    let [l, a, b] = linear_to_lab(linear);
+    [l, COLOUR_WEIGHT * a, COLOUR_WEIGHT * b]
 }
 
 /// The magnitude below which the given part of the points lie; 1 without points.

@@ -15,8 +15,9 @@ pub struct Gradient {
 }
 
 /// Samples of a Gaussian at `-r..=r`, sum 1, and of its derivative, exact on straight ramps; `r` is three standard deviations.
+/// Deviations outside 0.1..=100 pixels are taken to be its ends.
 fn kernels(sigma: f32) -> (Vec<f64>, Vec<f64>) {
-    let s = f64::from(sigma).max(0.1);
+    let s = if sigma.is_nan() { 0.1 } else { f64::from(sigma).clamp(0.1, 100.0) };
     let r = (3.0 * s).ceil() as i32;
     let g: Vec<f64> = (-r..=r).map(|i| libm::exp(-0.5 * f64::from(i * i) / (s * s))).collect();
     let sum: f64 = g.iter().sum();
@@ -139,6 +140,9 @@ mod tests {
         for (w, h) in [(1, 1), (1, 30), (30, 1), (2, 3)] {
             let g = colour_gradient(w, h, &vec![[7.0f32; 3]; (w * h) as usize], 2.0);
             assert!(g.magnitude.iter().all(|m| *m < 1e-4), "{w} x {h}");
+        }
+        for sigma in [f32::NAN, f32::INFINITY, -1.0] {
+            assert!(smoothed(3, 2, &[1.0; 6], sigma).iter().all(|v| (v - 1.0).abs() < 1e-5));
         }
         assert!(smoothed(0, 0, &[], 1.0).is_empty());
         assert_eq!([-1, -2, 0, 2, 3, 5, 6].map(|i| mirrored(i, 3)), [0, 1, 0, 2, 2, 0, 0]);

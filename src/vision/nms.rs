@@ -116,7 +116,7 @@ mod tests {
 
     #[test]
     fn straight_edges_are_found_where_they_are() {
-        for (angle, d) in [(0.0f32, 20.0), (0.0, 20.3), (0.4, 26.7), (0.785, 30.1), (1.2, 25.5), (1.5708, 19.8)] {
+        for (angle, d) in [(0.0f32, 20.0), (0.0, 20.3), (0.4, 26.7), (0.785, 30.1), (1.2, 25.5), (1.57, 19.8)] {
             let g = colour_gradient(40, 40, &half_plane(40, angle, d), 1.0);
             let points = suppress(&g, 5.0);
             let (c, s) = (libm::cosf(angle), libm::sinf(angle));

@@ -131,11 +131,15 @@ pub fn decode(bytes: &[u8], limits: &Limits) -> Result<Photo, VisionError> {
 /// The decoded picture, upright, in the file's own kind of pixels, and the camera's focal length.
 pub(crate) fn decode_dynamic(bytes: &[u8], limits: &Limits) -> Result<(DynamicImage, Option<f64>), VisionError> {
     let format = format_of(bytes)?;
+    // A PNG begins with its size; a decoder may stumble over an absurd one before it tells.
+    if let (ImageFormat::Png, Some(&[w0, w1, w2, w3, h0, h1, h2, h3])) = (format, bytes.get(16..24)) {
+        limits.check(u32::from_be_bytes([w0, w1, w2, w3]), u32::from_be_bytes([h0, h1, h2, h3]))?;
+    }
     let mut reader = ImageReader::with_format(Cursor::new(bytes), format);
     let mut allowed = image::Limits::no_limits();
     allowed.max_alloc = Some(limits.max_bytes());
     reader.limits(allowed);
-    let mut decoder = reader.into_decoder().map_err(|e| cause(e, limits))?;
+    let mut decoder = reader.into_decoder().map_err(cause)?;
     let (width, height) = decoder.dimensions();
     limits.check(width, height)?;
     if format == ImageFormat::Jpeg && !jpeg_ends(bytes) {
@@ -144,7 +148,7 @@ pub(crate) fn decode_dynamic(bytes: &[u8], limits: &Limits) -> Result<(DynamicIm
     // Damaged metadata are the same as none.
     let orientation = decoder.orientation().unwrap_or(image::metadata::Orientation::NoTransforms);
     let focal = decoder.exif_metadata().ok().flatten().and_then(|chunk| exif::focal_35mm(&chunk));
-    let mut picture = DynamicImage::from_decoder(decoder).map_err(|e| cause(e, limits))?;
+    let mut picture = DynamicImage::from_decoder(decoder).map_err(cause)?;
     picture.apply_orientation(orientation);
     Ok((picture, focal))
 }
@@ -189,13 +193,11 @@ fn jpeg_ends(bytes: &[u8]) -> bool {
     }
 }
 
-fn cause(error: ImageError, limits: &Limits) -> VisionError {
+fn cause(error: ImageError) -> VisionError {
     match error {
         ImageError::IoError(e) if e.kind() == std::io::ErrorKind::UnexpectedEof => VisionError::Truncated,
         ImageError::IoError(e) => VisionError::Io(e),
-        ImageError::Limits(_) => {
-            VisionError::TooManyBytes { bytes: limits.max_bytes() + 1, max_bytes: limits.max_bytes() }
-        }
+        ImageError::Limits(_) => VisionError::Damaged("it needs more memory than a picture of an allowed size".into()),
         other => {
             let text = other.to_string();
             let lower = text.to_ascii_lowercase();

@@ -133,6 +133,9 @@ fn bad_bytes_say_what_is_wrong() {
 fn size_is_checked_before_pixels() {
     let huge = read(&png_header(60000, 60000)).unwrap_err();
     assert!(matches!(huge, VisionError::TooLarge { width: 60000, height: 60000, .. }), "{huge}");
+    let absurd = read(&png_header(i32::MAX as u32, i32::MAX as u32)).unwrap_err();
+    assert!(matches!(absurd, VisionError::TooLarge { .. }), "{absurd}");
+    assert!(matches!(read(&png_header(0, 5)), Err(VisionError::Damaged(_))));
     assert!(matches!(read(&png_header(16385, 1)), Err(VisionError::TooLarge { .. })));
     assert!(matches!(read(&png_header(10001, 10000)), Err(VisionError::TooLarge { .. })));
     assert!(matches!(read(&png_header(100, 100)), Err(VisionError::Truncated | VisionError::Damaged(_))));
