@@ -160,7 +160,7 @@ impl Program {
     pub fn observe_file(self, name: &str, path: &str) -> Result<Program, Error> {
         let kind = self.interface().data.iter().find(|d| d.name == name).and_then(|d| d.ty.clone());
         let kind = kind.unwrap_or_else(|| "image".into());
-        let loaded = match self.loader.read(path) {
+        let loaded = match std::fs::read(path) {
             Ok(bytes) => data::load(&kind, path, &bytes),
             Err(e) => Err(Fault::new(FaultKind::Other, format!("cannot read {path}: {}", reason(&e)))),
         };

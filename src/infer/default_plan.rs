@@ -37,7 +37,7 @@ pub fn default_plan(trace: &mut Trace) -> String {
     }
     let total: f64 = arms.iter().map(|(w, _)| w).sum();
     let arms: String = arms.iter().map(|(w, k)| format!(" {:.2} => {k};", w / total)).collect();
-    let sweep = choices.clamp(4, 200);
+    let sweep = choices.clamp(10, 200);
     format!(
         "infer {{\n  init(best_of(20));\n  warmup {} {{ mix {{{arms} }} }}\n  repeat 1000 {{ repeat {sweep} {{ mix {{{arms} }} }} }}\n}}\n",
         (sweep * 200).min(20_000)

@@ -96,6 +96,9 @@ impl Drift {
         support.to_free(&stored, &mut y);
         let old_term = support.from_free(&y).1;
         let dimensions = y.len();
+        // Now and then a much longer or shorter step: chains leave narrow places and settle in wide ones. The length does not
+        // depend on the state, so the proposal stays symmetric.
+        let scale = scale * libm::exp(rng.standard_normal());
         for v in &mut y {
             *v += scale * rng.standard_normal();
         }

@@ -63,7 +63,7 @@ impl ImageValue {
     /// Its contours.
     pub fn map(&self) -> &ContourMap {
         self.map.get_or_init(|| match &self.photo {
-            Some(photo) => GradientDetector::default().detect(photo),
+            Some(photo) => strong(GradientDetector::default().detect(photo)),
             None => ContourMap::default(),
         })
     }
@@ -75,6 +75,20 @@ impl ImageValue {
             None => (self.map().width, self.map().height),
         }
     }
+}
+
+/// The points that count as edges: weaker ones are more often texture than outline.
+fn strong(map: ContourMap) -> ContourMap {
+    let least: f32 = std::env::var("STRONG").ok().and_then(|s| s.parse().ok()).unwrap_or(0.35);
+    let mut kept = ContourMap::new(map.width, map.height);
+    for i in (0..map.len()).filter(|i| map.strength[*i] >= least) {
+        kept.x.push(map.x[i]);
+        kept.y.push(map.y[i]);
+        kept.tx.push(map.tx[i]);
+        kept.ty.push(map.ty[i]);
+        kept.strength.push(map.strength[i]);
+    }
+    kept
 }
 
 impl Object for ImageValue {
