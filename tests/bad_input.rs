@@ -47,8 +47,12 @@ fn pictures_that_are_none() {
     let f = Folder::new("pictures");
     let whole = png(disc(64, 64, 32.0, 32.0, 20.0));
     f.write("p.pcad", PHOTO).write("empty.png", b"").write("cut.png", &whole[..whole.len() / 2]);
-    f.write("head.png", &whole[..10]).write("text.png", "This is a text.").write("sound.wav", b"RIFF\x24\x00\x00\x00WAVEfmt ");
-    f.write("claims.png", claims(16384, 16384)).write("huge.png", claims(60000, 60000)).write("lie.png", claims(9000, 9000));
+    f.write("head.png", &whole[..10])
+        .write("text.png", "This is a text.")
+        .write("sound.wav", b"RIFF\x24\x00\x00\x00WAVEfmt ");
+    f.write("claims.png", claims(16384, 16384))
+        .write("huge.png", claims(60000, 60000))
+        .write("lie.png", claims(9000, 9000));
     std::fs::create_dir(f.path().join("folder.png")).unwrap();
     for (file, says) in [
         ("missing.png", "cannot read missing.png: there is no such file"),
@@ -92,7 +96,10 @@ fn a_very_wide_picture_is_read() {
 fn cameras_that_are_none() {
     let f = Folder::new("cameras");
     f.write("p.pcad", PHOTO).write("x.png", png(disc(32, 32, 16.0, 16.0, 9.0)));
-    f.write("empty.json", "").write("list.json", "[1, 2]").write("text.json", "camera").write("bin.json", [0xff, 0xfe, 0]);
+    f.write("empty.json", "")
+        .write("list.json", "[1, 2]")
+        .write("text.json", "camera")
+        .write("bin.json", [0xff, 0xfe, 0]);
     f.write("none.json", "{}").write("nan.json", "{\"width\": 1e999}");
     f.refuses(&run(&["--camera", "missing.json", "--observe", "x.png"]), "cannot read missing.json");
     for file in ["empty.json", "list.json", "text.json", "bin.json", "none.json", "nan.json"] {
@@ -204,7 +211,9 @@ fn recursion_without_end() {
 fn very_large_programs() {
     let f = Folder::new("large");
     let n = 100_000;
-    for (open, close) in [("(", ")"), ("[", "]"), ("-", ""), ("{", "}"), ("if true { ", " } else { 0 }"), ("fn(x) { ", "}")] {
+    for (open, close) in
+        [("(", ")"), ("[", "]"), ("-", ""), ("{", "}"), ("if true { ", " } else { 0 }"), ("fn(x) { ", "}")]
+    {
         f.write("p.pcad", format!("assume x = {}1{};", open.repeat(n), close.repeat(n)));
         f.refuses(&run(&[]), "");
         f.refuses(&["check", "p.pcad"], "");
@@ -212,7 +221,8 @@ fn very_large_programs() {
     f.write("p.pcad", format!("assume x = {};", "(".repeat(n)));
     f.refuses(&run(&[]), "");
     // 5 MB of source are refused; a little less than 4 MiB is read, with a mistake at the end and without.
-    let comment = "// a comment that says nothing in particular, to make the file large, again and again, line by line\n";
+    let comment =
+        "// a comment that says nothing in particular, to make the file large, again and again, line by line\n";
     f.write("p.pcad", comment.repeat(50_000));
     f.refuses(&run(&[]), "the file is too large");
     let big = format!("{}assume x ~ normal(0, 1); observe normal(x, 1) = 1;\n", comment.repeat(40_000));
@@ -249,9 +259,12 @@ fn settings_that_are_none() {
     f.refuses(&q("n="), "");
     f.refuses(&q("n=-3"), "");
     f.refuses(&["run", "q.pcad", "--observe", "x.png"], "observes no data");
-    f.write("two.pcad", "include \"std/scene.pcad\" as scene; data a: image; data b: image; assume r ~ uniform(0.3, 1);
+    f.write(
+        "two.pcad",
+        "include \"std/scene.pcad\" as scene; data a: image; data b: image; assume r ~ uniform(0.3, 1);
         assume view = scene.render(scene.sphere(r));
-        observe scene.contour(view, size = 32) = a as a; observe scene.contour(view, size = 32) = b as b;");
+        observe scene.contour(view, size = 32) = a as a; observe scene.contour(view, size = 32) = b as b;",
+    );
     f.refuses(&["run", "two.pcad", "--observe", "x.png"], "several images");
     f.refuses(&["run", "two.pcad", "--observe", "a=x.png"], "b");
 }

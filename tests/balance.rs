@@ -30,7 +30,7 @@ fn bin(x: f64, edges: &[f64]) -> usize {
 const DISCRETE: Case = Case {
     name: "discrete",
     text: "assume a ~ categorical([0.2, 0.5, 0.3]); assume b ~ flip(if a == 1 { 0.7 } else { 0.2 });
-           observe normal(a + if b { 1 } else { 0 }, 0.7) = 1.5;",
+           observe normal(a + (if b { 1 } else { 0 }), 0.7) = 1.5;",
     collect: "a, b",
     cell: |d, i| d["a"][i] as usize * 2 + d["b"][i] as usize,
     mass: || {
@@ -57,8 +57,7 @@ const STRUCTURE: Case = Case {
     mass: || {
         let gamma = |b: f64| if b > 0.0 { b * (-b).exp() } else { 0.0 };
         let f = |x: f64| 0.6 * (0.3 * gamma(x) + 0.7 * gamma(x - 1.0)) * normal_pdf(2.0, x, 1.0);
-        let mut w: Vec<f64> =
-            (0..3).map(|a| 0.4 * [0.25, 0.5, 0.25][a] * normal_pdf(2.0, a as f64, 1.0)).collect();
+        let mut w: Vec<f64> = (0..3).map(|a| 0.4 * [0.25, 0.5, 0.25][a] * normal_pdf(2.0, a as f64, 1.0)).collect();
         w.extend([(0.0, 1.0), (1.0, 1.7), (1.7, 2.5), (2.5, 14.0)].map(|(a, b)| integrate(f, a, b, 2000)));
         normalised(w)
     },
@@ -92,9 +91,8 @@ const FINITE_SUPPORT: Case = Case {
     collect: "n, k",
     cell: |d, i| [0, 1, 3][d["n"][i] as usize] + d["k"][i] as usize,
     mass: || {
-        let p = |n: usize, k: usize| {
-            [0.3, 0.3, 0.4][n] / (n + 1) as f64 * normal_pdf(0.4, k as f64 - 0.5 * n as f64, 1.0)
-        };
+        let p =
+            |n: usize, k: usize| [0.3, 0.3, 0.4][n] / (n + 1) as f64 * normal_pdf(0.4, k as f64 - 0.5 * n as f64, 1.0);
         normalised(vec![p(0, 0), p(1, 0), p(1, 1), p(2, 0), p(2, 1), p(2, 2)])
     },
 };
@@ -136,7 +134,10 @@ const GAUSSIAN: Case = Case {
 fn balanced(case: &Case, kernel: &str, steps: usize) {
     let what = format!("{}, {kernel}", case.name);
     let stmt = if kernel.ends_with('}') { kernel.to_owned() } else { format!("{kernel};") };
-    let text = format!("{} infer {{ repeat 300 {{ {stmt} }} repeat {steps} {{ {stmt} collect {}; }} }}", case.text, case.collect);
+    let text = format!(
+        "{} infer {{ repeat 300 {{ {stmt} }} repeat {steps} {{ {stmt} collect {}; }} }}",
+        case.text, case.collect
+    );
     let d = run(&text, 101, 1);
     let states: Vec<usize> = (0..steps).map(|i| (case.cell)(&d, i)).collect();
     let mass = (case.mass)();
@@ -206,8 +207,14 @@ fn choices_that_appear_and_vanish() {
 
 #[test]
 fn one_address_in_two_branches() {
-    let kernels =
-        ["mh(one(@**))", "block(@**)", "drift(one(@**), 0.7)", "drift(@**, 0.7)", with_mh!("gibbs(@c)"), with_mh!("drift(@x/a, 0.8)")];
+    let kernels = [
+        "mh(one(@**))",
+        "block(@**)",
+        "drift(one(@**), 0.7)",
+        "drift(@**, 0.7)",
+        with_mh!("gibbs(@c)"),
+        with_mh!("drift(@x/a, 0.8)"),
+    ];
     all_balanced(&SHARED, 80_000, &kernels);
 }
 
@@ -225,8 +232,14 @@ fn values_that_depend_on_another_choice() {
 
 #[test]
 fn bounds_that_depend_on_another_choice() {
-    let kernels =
-        ["mh(one(@**))", "block(@**)", "drift(one(@**), 1)", "drift(@**, 0.8)", with_mh!("drift(@p1, 1)"), with_mh!("mh(@p2)")];
+    let kernels = [
+        "mh(one(@**))",
+        "block(@**)",
+        "drift(one(@**), 1)",
+        "drift(@**, 0.8)",
+        with_mh!("drift(@p1, 1)"),
+        with_mh!("mh(@p2)"),
+    ];
     all_balanced(&SUPPORT, 80_000, &kernels);
 }
 
