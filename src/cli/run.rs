@@ -3,7 +3,7 @@
 use super::args::Run;
 use super::{Failure, given, plain, progress, scene};
 use image::GrayImage;
-use pcadlang::geom::{glb, obj};
+use pcadlang::geom::{Mesh, Solid, glb, obj};
 use pcadlang::infer::draws::{KernelStats, Sink};
 use pcadlang::infer::{ChainResult, Progress};
 use pcadlang::lang::builtins::scene::{SolidValue, ViewValue};
@@ -236,12 +236,24 @@ fn draw(
     let spread = encode(png(&frequency(chains, a, 128)))?;
     write(dir, "uncertainty.png", &spread)?;
     shown.pictures.push(("how often the last draws of the chains cover a pixel", spread));
-    let mesh = view.solid().to_mesh().map_err(|e| plain(e.to_string()))?;
-    write(dir, "best.obj", obj::write(&mesh).as_bytes())?;
-    write(dir, "best.glb", &glb::write(&mesh))?;
-    let positions = mesh.positions.iter().map(|p| p.to_array()).collect();
-    shown.mesh = Some((positions, mesh.topology.triangles.clone()));
+    if let Some(mesh) = mesh(view.solid()) {
+        write(dir, "best.obj", obj::write(&mesh).as_bytes())?;
+        write(dir, "best.glb", &glb::write(&mesh))?;
+        let positions = mesh.positions.iter().map(|p| p.to_array()).collect();
+        shown.mesh = Some((positions, mesh.topology.triangles.clone()));
+    }
     Ok(())
+}
+
+/// The mesh of a solid; a solid too far away or too small for single precision has none, which is no reason to lose the run.
+fn mesh(solid: &Solid) -> Option<Mesh> {
+    match solid.to_mesh() {
+        Ok(mesh) => Some(mesh),
+        Err(e) => {
+            eprintln!("warning: no mesh is written: {e}");
+            None
+        }
+    }
 }
 
 /// How many of the chains' last states cover each pixel.
@@ -284,7 +296,7 @@ fn export(
     let name = x.file.trim_start_matches(['/', '.']);
     match solid {
         Some(solid) => {
-            let mesh = solid.to_mesh().map_err(|e| plain(e.to_string()))?;
+            let Some(mesh) = mesh(&solid) else { return Ok(()) };
             let bytes = if name.ends_with(".glb") { glb::write(&mesh) } else { obj::write(&mesh).into_bytes() };
             write(dir, &name.replace('/', "_"), &bytes)
         }

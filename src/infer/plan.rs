@@ -341,8 +341,10 @@ impl Runner<'_> {
         let passes = self.count(count)?;
         self.in_warmup = true;
         let mut flow = Flow::Next;
-        let mut i = 0;
-        while self.options.warmup.is_some() || i < passes {
+        let (mut i, first) = (0, self.step);
+        // More passes than the program says only if they get somewhere: a loop without kernels would never end.
+        let unbounded = self.options.warmup.is_some();
+        while i < passes || unbounded && (i == 0 || self.step > first) {
             flow = self.pass(i, passes, body)?;
             i += 1;
             if flow != Flow::Next {
@@ -359,8 +361,8 @@ impl Runner<'_> {
         let passes = self.count(count)?;
         let outermost = self.loops == 0 && !self.in_warmup;
         let unbounded = outermost && (self.options.steps.is_some() || self.options.time.is_some());
-        let mut i = 0;
-        while unbounded || i < passes {
+        let (mut i, first) = (0, self.step);
+        while i < passes || unbounded && (i == 0 || self.step > first) {
             let flow = self.pass(i, passes, body)?;
             i += 1;
             match flow {

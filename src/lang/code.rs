@@ -420,12 +420,17 @@ impl Block {
     }
 }
 
+/// Among how many constants one of the same value is looked for.
+const SHARED_CONSTANTS: usize = 256;
+
 impl Code {
     /// The index of a constant, added if new. Numbers, bools and strings are shared.
     pub fn constant(&mut self, v: Value) -> Operand {
         let shareable = matches!(v, Value::Num(_) | Value::Bool(_) | Value::Str(_) | Value::Unit | Value::Builtin(_));
-        if shareable && let Some(i) = self.consts.iter().position(|c| c.same(&v)) {
-            return Operand::Const(i as u32);
+        // Only the last ones are looked at, so that a long table of numbers costs no more than its length.
+        let first = self.consts.len().saturating_sub(SHARED_CONSTANTS);
+        if shareable && let Some(i) = self.consts[first..].iter().position(|c| c.same(&v)) {
+            return Operand::Const((first + i) as u32);
         }
         self.consts.push(v);
         Operand::Const(self.consts.len() as u32 - 1)

@@ -116,7 +116,7 @@ pub fn load(path: &str, loader: &dyn Loader, map: &mut SourceMap) -> Result<Load
         }
     };
     let mut loading = Loading { loader, map, loaded: Loaded::default(), errors: Vec::new(), stack: Vec::new() };
-    loading.unit(path, &bytes, inside);
+    loading.unit(tidy(path), &bytes, inside);
     loading.finish()
 }
 
@@ -143,6 +143,14 @@ pub fn reason(e: &io::Error) -> String {
         io::ErrorKind::IsADirectory => "it is a folder".into(),
         _ => e.to_string(),
     }
+}
+
+/// A path without the `./` at its start: a file has one name here, so that a circle is seen.
+fn tidy(mut path: &str) -> &str {
+    while let Some(rest) = path.strip_prefix("./") {
+        path = rest.trim_start_matches('/');
+    }
+    path
 }
 
 struct Loading<'a> {
@@ -201,6 +209,7 @@ impl Loading<'_> {
     }
 
     fn include(&mut self, folder: &str, path: &str, span: Span) -> Option<usize> {
+        let path = tidy(path);
         let beside = format!("{folder}{path}");
         let found = read(self.loader, &beside).map(|f| (f, beside.clone()));
         let found = found.or_else(|e| read(self.loader, path).map(|f| (f, path.to_owned())).map_err(|_| e));

@@ -71,8 +71,8 @@ pub(crate) struct Graph {
     /// The log prior of what this update drew from the prior, and of what it would have to draw to be undone.
     pub drawn: ExactSum,
     pub undrawn: ExactSum,
-    /// The choices this update removed: address hash and stored value.
-    pub removed: Vec<(u64, Datum)>,
+    /// The choices this update removed: node, address hash and stored value.
+    pub removed: Vec<(NodeId, u64, Datum)>,
     /// The log Jacobians of choices set through the unconstrained space.
     pub jacobian: f64,
     /// Choices that appeared and vanished in this update.

@@ -141,7 +141,13 @@ impl Trace {
 
     /// The choices that vanish in the pending proposal, with the values they had.
     pub fn removed(&self) -> Vec<(u64, Constraint)> {
-        self.graph.removed.iter().map(|(h, d)| (*h, Constraint::Stored(d.clone()))).collect()
+        self.graph.removed.iter().map(|(_, h, d)| (*h, Constraint::Stored(d.clone()))).collect()
+    }
+
+    /// Whether the pending proposal takes away a choice: also one that is drawn anew at the same place, because its form
+    /// changed. What was proposed for it had no effect.
+    pub fn was_removed(&self, t: Target) -> bool {
+        self.graph.removed.iter().any(|(n, _, _)| *n == t.node)
     }
 
     /// Keeps the pending proposal, if there is one.

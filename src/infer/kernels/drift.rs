@@ -65,12 +65,29 @@ impl Spread {
 
 /// The part of the proposal ratio that is known before the update.
 struct Move {
-    change: Change,
-    /// The log Jacobian at the old point, or the log number of values it could have moved to.
+    /// None for a choice that has only one value.
+    change: Option<Change>,
+    /// The log density of the move by itself: less the log number of values it could have gone to, or the log Jacobian at
+    /// the old point.
     old_term: f64,
-    /// Whether the choice jumped among finitely many values.
-    finite: bool,
+    /// For a choice of finitely many values: the one it had.
+    finite: Option<Datum>,
     dimensions: usize,
+}
+
+impl Move {
+    /// The log density of the move back, without what [`crate::trace::Weight`] has; `None` if there is no way back.
+    fn back(&self, trace: &Trace, t: Target) -> Option<f64> {
+        let values = trace.dist(t)?.stored_support().finite_values();
+        match (&self.finite, values) {
+            (None, None) => Some(0.0),
+            (Some(old), Some(v)) if self.change.is_some() => {
+                (v.len() > 1 && v.contains(old)).then(|| -libm::log(v.len() as f64 - 1.0))
+            }
+            (Some(_), Some(v)) => (v.len() == 1).then_some(0.0),
+            _ => None,
+        }
+    }
 }
 
 impl Drift {
@@ -102,7 +119,7 @@ impl Drift {
         for v in &mut y {
             *v += scale * rng.standard_normal();
         }
-        Some(Move { change: Change::Free(y), old_term, finite: false, dimensions })
+        Some(Move { change: Some(Change::Free(y)), old_term, finite: None, dimensions })
     }
 
     fn key(&self, trace: &Trace, targets: &[Target]) -> u64 {
@@ -124,21 +141,22 @@ impl Drift {
 fn discrete_move(support: &Support, stored: &Datum, scale: f64, rng: &mut Stream) -> Option<Move> {
     if let Some(values) = support.finite_values() {
         let here = values.iter().position(|v| v == stored)?;
+        let finite = Some(stored.clone());
         if values.len() < 2 {
-            return None;
+            return Some(Move { change: None, old_term: 0.0, finite, dimensions: 0 });
         }
         let mut i = rng.index(values.len() - 1);
         if i >= here {
             i += 1;
         }
         let old_term = -libm::log(values.len() as f64 - 1.0);
-        return Some(Move { change: Change::Set(values[i].clone()), old_term, finite: true, dimensions: 1 });
+        return Some(Move { change: Some(Change::Set(values[i].clone())), old_term, finite, dimensions: 1 });
     }
     let Datum::Num(x) = stored else { return None };
     let reach = 1 + libm::floor(scale.clamp(0.0, 1e6)) as usize;
     let jump = 1.0 + rng.index(reach) as f64;
     let to = if rng.uniform() < 0.5 { x + jump } else { x - jump };
-    Some(Move { change: Change::Set(Datum::Num(to)), old_term: 0.0, finite: false, dimensions: 1 })
+    Some(Move { change: Some(Change::Set(Datum::Num(to))), old_term: 0.0, finite: None, dimensions: 1 })
 }
 
 impl Kernel for Drift {
@@ -157,21 +175,14 @@ impl Kernel for Drift {
         let scale = libm::exp(self.scales.entry(key).or_insert(Scale { log: log_scale, steps: 0.0 }).log);
         let joint = targets.len() > 1;
         let mut changes = Vec::with_capacity(targets.len());
-        let mut finite = Vec::new();
-        let mut old_terms = 0.0;
-        let mut jacobians = 0.0;
+        let mut moves = Vec::with_capacity(targets.len());
         let mut dimensions = 0;
         for t in &targets {
             let spread = if joint { self.spreads.get(&trace.address_hash(*t)).map_or(1.0, Spread::sd) } else { 1.0 };
             let Some(m) = self.propose_one(trace, *t, scale * spread, &mut rng) else { continue };
-            if m.finite {
-                old_terms += m.old_term;
-                finite.push(*t);
-            } else {
-                jacobians += m.old_term;
-            }
             dimensions += m.dimensions;
-            changes.push((*t, m.change));
+            changes.extend(m.change.clone().map(|c| (*t, c)));
+            moves.push((*t, m));
         }
         if changes.is_empty() {
             return Ok(Outcome::default());
@@ -180,13 +191,11 @@ impl Kernel for Drift {
         let outcome = match recoverable(proposed)? {
             None => Outcome::failed(),
             Some(w) => {
-                let mut ratio = at.tempered(&w) + w.log_jacobian - jacobians + ways - self.scope.ways_back(trace);
-                // A jump among k values pays log(k - 1) in each state.
-                for t in &finite {
-                    let values = trace.dist(*t).and_then(|d| d.stored_support().finite_values());
-                    ratio -= libm::log(values.map_or(1.0, |v| (v.len() as f64 - 1.0).max(1.0)));
+                let mut ratio = at.tempered(&w) + w.log_jacobian + ways - self.scope.ways_back(trace);
+                // A choice that vanishes goes whatever its move was, and comes back from its prior.
+                for (t, m) in moves.iter().filter(|(t, _)| !trace.was_removed(*t)) {
+                    ratio += m.back(trace, *t).unwrap_or(f64::NEG_INFINITY) - m.old_term;
                 }
-                ratio -= old_terms;
                 decide(trace, ratio, &mut rng)
             }
         };

@@ -98,7 +98,7 @@ pub struct Compiled {
 /// Lowers a loaded program. The text of `--set` values goes to `map` too.
 ///
 /// # Errors
-/// Everything that is wrong with it, in the order of the text.
+/// Everything that is wrong with it, in the order of the text; settings first.
 pub fn compile(loaded: &Loaded, inputs: Inputs, map: &mut SourceMap) -> Result<Compiled, Vec<Diagnostic>> {
     let mut l = Lowerer {
         code: Code { builtins: Arc::clone(&inputs.builtins), ..Code::default() },
@@ -127,7 +127,8 @@ pub fn compile(loaded: &Loaded, inputs: Inputs, map: &mut SourceMap) -> Result<C
     l.inference();
     l.unused_inputs();
     if !l.errors.is_empty() {
-        l.errors.sort_by_key(|d| d.labels.first().map_or((u32::MAX, 0), |l| (l.span.file.0, l.span.start)));
+        // What has no place is about the command line: it comes first.
+        l.errors.sort_by_key(|d| d.labels.first().map(|l| (l.span.file.0, l.span.start)));
         l.errors.dedup();
         return Err(l.errors);
     }

@@ -330,7 +330,7 @@ impl Graph {
         self.vanished += 1;
         let hash = self.choice_hash(code, n);
         if let Some(stored) = self.stored(n) {
-            self.removed.push((hash, stored));
+            self.removed.push((n, hash, stored));
         }
         match self.nodes[n as usize].side.as_deref() {
             Some(Side::Choice(c)) if c.elements != NONE => {

@@ -1,0 +1,331 @@
+//! Every kernel is reversible: the joint counts of (state, next state) are symmetric, and the marginal is the posterior.
+//!
+//! For a reversible chain in equilibrium the numbers of moves i to j and j to i have the same expectation, also for states
+//! lumped together, and the variance of their difference is at most that of independent moves. A mixture of reversible
+//! kernels is reversible, so a kernel that does not reach everything by itself is mixed with one that does.
+
+mod common;
+use common::*;
+
+/// A model, the cells its states are sorted into, and the posterior mass of each.
+struct Case {
+    name: &'static str,
+    text: &'static str,
+    collect: &'static str,
+    cell: fn(&Draws, usize) -> usize,
+    mass: fn() -> Vec<f64>,
+}
+
+fn normalised(mut w: Vec<f64>) -> Vec<f64> {
+    let z: f64 = w.iter().sum();
+    w.iter_mut().for_each(|x| *x /= z);
+    w
+}
+
+/// Which of the intervals between edges a number is in.
+fn bin(x: f64, edges: &[f64]) -> usize {
+    edges.iter().take_while(|e| x >= **e).count()
+}
+
+const DISCRETE: Case = Case {
+    name: "discrete",
+    text: "assume a ~ categorical([0.2, 0.5, 0.3]); assume b ~ flip(if a == 1 { 0.7 } else { 0.2 });
+           observe normal(a + (if b { 1 } else { 0 }), 0.7) = 1.5;",
+    collect: "a, b",
+    cell: |d, i| d["a"][i] as usize * 2 + d["b"][i] as usize,
+    mass: || {
+        let p = |a: usize, b: usize| {
+            let pb = if a == 1 { 0.7 } else { 0.2 };
+            [0.2, 0.5, 0.3][a] * if b == 1 { pb } else { 1.0 - pb } * normal_pdf(1.5, (a + b) as f64, 0.7)
+        };
+        normalised((0..6).map(|i| p(i / 2, i % 2)).collect())
+    },
+};
+
+/// One branch has a discrete choice, the other a positive one with a switch of its own.
+const STRUCTURE: Case = Case {
+    name: "structure",
+    text: "assume c ~ flip(0.4);
+           assume x = if c { a ~ categorical([1, 2, 1]); a }
+                      else { b ~ gamma(2, 1); d ~ flip(0.3); if d { b } else { b + 1 } };
+           observe normal(x, 1) = 2;",
+    collect: "c, x",
+    cell: |d, i| {
+        let x = d["x"][i];
+        if d["c"][i] == 1.0 { x as usize } else { 3 + bin(x, &[1.0, 1.7, 2.5]) }
+    },
+    mass: || {
+        let gamma = |b: f64| if b > 0.0 { b * (-b).exp() } else { 0.0 };
+        let f = |x: f64| 0.6 * (0.3 * gamma(x) + 0.7 * gamma(x - 1.0)) * normal_pdf(2.0, x, 1.0);
+        let mut w: Vec<f64> = (0..3).map(|a| 0.4 * [0.25, 0.5, 0.25][a] * normal_pdf(2.0, a as f64, 1.0)).collect();
+        w.extend([(0.0, 1.0), (1.0, 1.7), (1.7, 2.5), (2.5, 14.0)].map(|(a, b)| integrate(f, a, b, 2000)));
+        normalised(w)
+    },
+};
+
+/// The same address in both branches, with supports of different shape.
+const SHARED: Case = Case {
+    name: "shared address",
+    text: "assume c ~ flip(0.4);
+           assume x = if c { a ~ beta(2, 3); a } else { a ~ gamma(2, 1); a };
+           observe normal(x, 0.5) = 0.8;",
+    collect: "c, x",
+    cell: |d, i| d["c"][i] as usize * 3 + bin(d["x"][i], &[0.4, 0.8]),
+    mass: || {
+        let beta = |x: f64| if x > 0.0 && x < 1.0 { 12.0 * x * (1.0 - x) * (1.0 - x) } else { 0.0 };
+        let gamma = |x: f64| x * (-x).exp();
+        let cell = |lo: f64, hi: f64, c: bool| {
+            let f = |x: f64| if c { 0.4 * beta(x) } else { 0.6 * gamma(x) } * normal_pdf(0.8, x, 0.5);
+            integrate(f, lo, hi, 2000)
+        };
+        let parts = |c: bool| [(0.0, 0.4), (0.4, 0.8), (0.8, if c { 1.0 } else { 9.0 })].map(|(a, b)| cell(a, b, c));
+        normalised([parts(false), parts(true)].concat())
+    },
+};
+
+/// The values that k can take depend on n; with n = 0 there is only one.
+const FINITE_SUPPORT: Case = Case {
+    name: "finite support",
+    text: "assume n ~ categorical([0.3, 0.3, 0.4]); assume k ~ uniform_discrete(0, n);
+           observe normal(k - 0.5 * n, 1) = 0.4;",
+    collect: "n, k",
+    cell: |d, i| [0, 1, 3][d["n"][i] as usize] + d["k"][i] as usize,
+    mass: || {
+        let p =
+            |n: usize, k: usize| [0.3, 0.3, 0.4][n] / (n + 1) as f64 * normal_pdf(0.4, k as f64 - 0.5 * n as f64, 1.0);
+        normalised(vec![p(0, 0), p(1, 0), p(1, 1), p(2, 0), p(2, 1), p(2, 2)])
+    },
+};
+
+const SUPPORT: Case = Case {
+    name: "support",
+    text: "assume p1 ~ uniform(0.5, 1); assume p2 ~ uniform(0, p1); observe binomial(4, p2) = 1;",
+    collect: "p1, p2",
+    cell: |d, i| bin(d["p1"][i], &[0.75]) * 4 + bin(d["p2"][i], &[0.15, 0.3, 0.5]),
+    mass: || {
+        let like = |p: f64| p * (1.0 - p).powi(3);
+        let cell = |lo: f64, hi: f64, a: f64, b: f64| {
+            integrate(|p1| integrate(like, a, b.min(p1).max(a), 200) / p1, lo, hi, 200)
+        };
+        let row = |lo, hi| [(0.0, 0.15), (0.15, 0.3), (0.3, 0.5), (0.5, 1.0)].map(|(a, b)| cell(lo, hi, a, b));
+        normalised([row(0.5, 0.75), row(0.75, 1.0)].concat())
+    },
+};
+
+const GAUSSIAN: Case = Case {
+    name: "gaussian",
+    text: "assume a ~ normal(0.5, 1); assume b ~ normal(a, 1); observe normal(a * b, 0.8) = 1;",
+    collect: "a, b",
+    cell: |d, i| bin(d["a"][i], &[-0.5, 0.5, 1.2]) * 3 + bin(d["b"][i], &[0.0, 1.0]),
+    mass: || {
+        let cell = |a0: f64, a1: f64, b0: f64, b1: f64| {
+            let inner = |a: f64| {
+                integrate(|b| normal_pdf(b, a, 1.0) * normal_pdf(1.0, a * b, 0.8), b0, b1, 600)
+                    * normal_pdf(a, 0.5, 1.0)
+            };
+            integrate(inner, a0, a1, 600)
+        };
+        let row = |a0, a1| [(-8.0, 0.0), (0.0, 1.0), (1.0, 9.0)].map(|(b0, b1)| cell(a0, a1, b0, b1));
+        normalised([row(-5.0, -0.5), row(-0.5, 0.5), row(0.5, 1.2), row(1.2, 6.0)].concat())
+    },
+};
+
+/// Runs a kernel for long and judges it.
+fn balanced(case: &Case, kernel: &str, steps: usize) {
+    let what = format!("{}, {kernel}", case.name);
+    let stmt = if kernel.ends_with('}') { kernel.to_owned() } else { format!("{kernel};") };
+    let text = format!(
+        "{} infer {{ repeat 300 {{ {stmt} }} repeat {steps} {{ {stmt} collect {}; }} }}",
+        case.text, case.collect
+    );
+    let d = run(&text, 101, 1);
+    let states: Vec<usize> = (0..steps).map(|i| (case.cell)(&d, i)).collect();
+    let mass = (case.mass)();
+    let n = mass.len();
+    let mut counts = vec![vec![0.0f64; n]; n];
+    states.windows(2).for_each(|w| counts[w[0]][w[1]] += 1.0);
+    let mut moves = 0.0;
+    for i in 0..n {
+        for j in i + 1..n {
+            let (there, back) = (counts[i][j], counts[j][i]);
+            moves += there + back;
+            let bound = 5.0 * (there + back).sqrt() + 5.0;
+            assert!((there - back).abs() < bound, "{what}: {i} to {j} {there} times, back {back} times");
+        }
+    }
+    assert!(moves > 0.01 * steps as f64, "{what}: the chain hardly moves");
+    for (i, expected) in mass.iter().enumerate() {
+        let here: Vec<f64> = states.iter().map(|s| f64::from(u8::from(*s == i))).collect();
+        let (m, se) = (mean(&here), standard_error(&here));
+        assert!(se < 0.02, "{what}: run longer, se {se}");
+        assert!((m - expected).abs() < 5.0 * se + 1e-4, "{what}: cell {i} has {m} (se {se}), expected {expected}");
+    }
+}
+
+fn all_balanced(case: &Case, steps: usize, kernels: &[&str]) {
+    kernels.iter().for_each(|k| balanced(case, k, steps));
+}
+
+/// A kernel and, every other time, one that reaches everything.
+macro_rules! with_mh {
+    ($k:literal) => {
+        concat!("mix { 0.6 => ", $k, "; 0.4 => mh(one(@**)); }")
+    };
+}
+
+#[test]
+fn discrete_choices() {
+    let kernels = [
+        "mh(one(@**))",
+        "block(@**)",
+        "block(one(@**))",
+        "gibbs(one(@**))",
+        "drift(one(@**), 1)",
+        "drift(@**, 1)",
+        with_mh!("gibbs(@a)"),
+        with_mh!("mh(@b)"),
+        with_mh!("drift(@a, 1)"),
+    ];
+    all_balanced(&DISCRETE, 60_000, &kernels);
+}
+
+#[test]
+fn choices_that_appear_and_vanish() {
+    let kernels = [
+        "mh(one(@**))",
+        "block(@**)",
+        "block(one(@**))",
+        "drift(one(@**), 0.7)",
+        "drift(@**, 0.7)",
+        with_mh!("gibbs(@c)"),
+        with_mh!("gibbs(one($finite))"),
+        with_mh!("drift($continuous, 0.8)"),
+        with_mh!("block(@x/**)"),
+    ];
+    all_balanced(&STRUCTURE, 80_000, &kernels);
+}
+
+#[test]
+fn one_address_in_two_branches() {
+    let kernels = [
+        "mh(one(@**))",
+        "block(@**)",
+        "drift(one(@**), 0.7)",
+        "drift(@**, 0.7)",
+        with_mh!("gibbs(@c)"),
+        with_mh!("drift(@x/a, 0.8)"),
+    ];
+    all_balanced(&SHARED, 80_000, &kernels);
+}
+
+#[test]
+fn values_that_depend_on_another_choice() {
+    let kernels = [
+        "mix { 0.5 => mh(one(@**)); 0.5 => block(@**); }",
+        "block(@**)",
+        "mix { 0.5 => drift(@**, 1); 0.5 => block(@**); }",
+        "mix { 0.5 => drift(one(@**), 1); 0.5 => block(@**); }",
+        "mix { 0.5 => gibbs(one(@**)); 0.5 => block(@**); }",
+    ];
+    all_balanced(&FINITE_SUPPORT, 80_000, &kernels);
+}
+
+#[test]
+fn bounds_that_depend_on_another_choice() {
+    let kernels = [
+        "mh(one(@**))",
+        "block(@**)",
+        "drift(one(@**), 1)",
+        "drift(@**, 0.8)",
+        with_mh!("drift(@p1, 1)"),
+        with_mh!("mh(@p2)"),
+    ];
+    all_balanced(&SUPPORT, 80_000, &kernels);
+}
+
+#[test]
+fn gaussian_choices() {
+    let kernels = [
+        "elliptical(@**)",
+        "elliptical(one(@**))",
+        with_mh!("elliptical(@a)"),
+        with_mh!("elliptical(@b)"),
+        "drift(@**, 0.9)",
+        "drift(one(@**), 1.2)",
+        "mh(one(@**))",
+        "block(@**)",
+    ];
+    all_balanced(&GAUSSIAN, 80_000, &kernels);
+}
+
+/// Getting it right (Geweke 2004): data drawn anew given the parameters, then the parameters moved given the data, by turns.
+/// Then parameters and data follow the joint prior, whose moments are known. Data are choices that are drawn by `block`,
+/// which takes them from their prior given the rest.
+#[test]
+fn parameters_and_data_by_turns() {
+    for kernel in ["mh(one(%))", "block(%)", "drift(%, 0.7)", "drift(one(%), 1)"] {
+        let k = kernel.replace('%', "(@s + @m + @w)");
+        let text = format!(
+            "assume s ~ gamma(3, 3); assume m ~ normal(0, 1); assume w ~ beta(2, 2);
+             for i in 0 .. 3 {{ y[i] ~ normal(m + w, s); }}
+             observe normal(0 * sum(map(fn(i) {{ y[i] }}, 0 .. 3)), 1) = 0;
+             infer {{ repeat 60000 {{ {k}; block(@y); collect s, m, w, y[0] * y[1], m * m, s * s; }} }}"
+        );
+        let d = run(&text, 7, 2);
+        // gamma(3, rate 3): mean 1, mean square 4/3; beta(2, 2): mean 1/2, mean square 3/10.
+        assert_mean(&format!("{kernel} s"), &d["s"], 1.0, 0.1);
+        assert_mean(&format!("{kernel} s^2"), &d["s * s"], 4.0 / 3.0, 0.3);
+        assert_mean(&format!("{kernel} m"), &d["m"], 0.0, 0.15);
+        assert_mean(&format!("{kernel} m^2"), &d["m * m"], 1.0, 0.25);
+        assert_mean(&format!("{kernel} w"), &d["w"], 0.5, 0.05);
+        assert_mean(&format!("{kernel} y0 y1"), &d["y[0] * y[1]"], 1.3, 0.3);
+    }
+}
+
+/// Simulation-based calibration (Talts et al. 2018): parameters from the prior, data from them, and the rank of the
+/// parameter among posterior draws is uniform.
+fn calibrated(runs: usize) {
+    use pcadlang::rng::{Purpose, StreamKey};
+    let (bins, thinned) = (8usize, 63usize);
+    let mut counts = [vec![0.0; bins], vec![0.0; bins]];
+    for r in 0..runs as u64 {
+        let mut rng = StreamKey::new(5, 0, Purpose(77)).stream(r, 0, 0);
+        let m = 1.0 + 2.0 * rng.standard_normal();
+        let p = rng.uniform();
+        let y: Vec<f64> = (0..3)
+            .map(|_| {
+                let far = rng.uniform() < p;
+                m + if far { 2.0 } else { 0.0 } + 0.8 * rng.standard_normal()
+            })
+            .collect();
+        let text = format!(
+            "assume m ~ normal(1, 2); assume p ~ uniform(0, 1);
+             let y = {y:?};
+             for i in 0 .. 3 {{ z[i] ~ flip(p); observe normal(if z[i] {{ m + 2 }} else {{ m }}, 0.8) = y[i]; }}
+             infer {{ warmup 300 {{ drift(@m); drift(@p); gibbs(one(@z)); }}
+               repeat {thinned} {{ repeat 30 {{ drift(@m); drift(@p); gibbs(one(@z)); elliptical(@m); mh(@p); }} collect m, p; }} }}"
+        );
+        let d = run(&text, r, 1);
+        for (count, (name, truth)) in counts.iter_mut().zip([("m", m), ("p", p)]) {
+            let rank = d[name].iter().filter(|x| **x < truth).count();
+            count[rank * bins / (thinned + 1)] += 1.0;
+        }
+    }
+    for (count, name) in counts.iter().zip(["m", "p"]) {
+        let expected = runs as f64 / bins as f64;
+        let chi: f64 = count.iter().map(|c| (c - expected) * (c - expected) / expected).sum();
+        // 7 degrees of freedom: above 35 with a chance of 1e-5.
+        assert!(chi < 35.0, "{name}: ranks {count:?}, chi-square {chi}");
+    }
+}
+
+#[test]
+fn ranks_of_the_truth_are_uniform() {
+    calibrated(160);
+}
+
+#[test]
+#[ignore = "a minute"]
+fn ranks_of_the_truth_are_uniform_in_many_runs() {
+    calibrated(2000);
+}

@@ -1,0 +1,194 @@
+//! Sessions with the command, word for word, and the same draws on any number of threads.
+//!
+//! `INSTA_UPDATE=always cargo test --test cli` accepts what the command says now: read it first as a user would. Times are
+//! not in these texts: where a session prints some, they are replaced.
+
+#[path = "common/folder.rs"]
+mod folder;
+
+use folder::{Folder, disc, png};
+
+/// Everything a command shows: its exit code, its output, its messages.
+fn session(f: &Folder, args: &[&str]) -> String {
+    let d = f.run(args);
+    let mut s = format!("$ pcadlang {}\nexit {}\n", args.join(" "), d.code);
+    for (name, text) in [("stdout", d.out), ("stderr", d.err)] {
+        if !text.is_empty() {
+            s.push_str(&format!("--- {name}\n{}", text.trim_end()));
+            s.push('\n');
+        }
+    }
+    s
+}
+
+fn snapshot(name: &str, text: &str) {
+    let mut settings = insta::Settings::clone_current();
+    settings.set_prepend_module_to_snapshot(false);
+    settings.set_omit_expression(true);
+    settings.set_snapshot_path("snapshots/cli");
+    settings.bind(|| insta::assert_snapshot!(name, text));
+}
+
+fn sessions(name: &str, all: &[&[&str]]) {
+    let f = Folder::new(name);
+    let text: Vec<String> = all.iter().map(|args| session(&f, args)).collect();
+    assert!(f.files().is_empty(), "{:?}", f.files());
+    snapshot(name, &text.join("\n"));
+}
+
+#[test]
+fn check_of_every_shipped_program() {
+    let all: Vec<Vec<&str>> = pcadlang::lang::load::shipped().map(|p| vec!["check", p]).collect();
+    sessions("check", &all.iter().map(Vec::as_slice).collect::<Vec<_>>());
+}
+
+#[test]
+fn check_of_mistakes() {
+    let f = Folder::new("check_mistakes");
+    f.write("good.pcad", "param n: int = 3 \"how many\"; assume x ~ normal(0, n); observe normal(x, 1) = 2;");
+    f.write("bad.pcad", "assume x ~ nomal(0, 1);\nobserve normal(y, 1) = 2;\n");
+    f.write("worse.pcad", "assume x = ;\nlet 3 = 4;\n");
+    let text: Vec<String> = [&["check", "good.pcad", "bad.pcad", "worse.pcad"][..], &["check", "coin.pcat"]]
+        .iter()
+        .map(|a| session(&f, a))
+        .collect();
+    snapshot("check_mistakes", &text.join("\n"));
+}
+
+#[test]
+fn doc() {
+    sessions(
+        "doc",
+        &[
+            &["doc", "normal"],
+            &["doc", "scene.lathe"],
+            &["doc", "lathe"],
+            &["doc", "pi"],
+            &["doc", "nothing"],
+            &["doc", "nomal"],
+            &["doc", ""],
+        ],
+    );
+    let f = Folder::new("doc_all");
+    let all = f.succeeds(&["doc"]).out;
+    assert!(all.contains("**`normal(") && all.contains("## Constants") && all.lines().count() > 100);
+}
+
+#[test]
+fn help() {
+    let all: [&[&str]; 7] = [
+        &["--help"],
+        &["run", "--help"],
+        &["sample", "--help"],
+        &["check", "--help"],
+        &["contours", "--help"],
+        &["doc", "--help"],
+        &["--version"],
+    ];
+    sessions("help", &all);
+}
+
+/// Exit code 2 is for what the command line itself gets wrong.
+#[test]
+fn usage() {
+    sessions(
+        "usage",
+        &[
+            &[],
+            &["rum"],
+            &["run"],
+            &["check"],
+            &["run", "coin.pcad", "--step", "3"],
+            &["run", "coin.pcad", "--chains", "0"],
+            &["run", "coin.pcad", "--chains", "many"],
+            &["run", "coin.pcad", "--set", "a"],
+            &["run", "coin.pcad", "--time", "soon"],
+            &["run", "coin.pcad", "--seed", "-1"],
+            &["sample", "coin.pcad", "-n", "0"],
+            &["contours", "x.png", "--size", "3"],
+        ],
+    );
+}
+
+/// The times in a summary, taken out.
+fn timeless(json: &str) -> serde_json::Value {
+    fn strip(v: &mut serde_json::Value) {
+        match v {
+            serde_json::Value::Object(m) => {
+                m.retain(|k, _| !k.contains("seconds") && !k.contains("per_second"));
+                m.values_mut().for_each(strip);
+            }
+            serde_json::Value::Array(a) => a.iter_mut().for_each(strip),
+            _ => {}
+        }
+    }
+    let mut v = serde_json::from_str(json).unwrap_or_else(|e| panic!("{e} in {json}"));
+    strip(&mut v);
+    v
+}
+
+#[test]
+fn a_run_of_the_coin() {
+    let f = Folder::new("coin");
+    let quiet = f.succeeds(&["run", "coin.pcad", "--seed", "1", "--steps", "200", "--quiet", "--out", "a"]);
+    assert_eq!((quiet.out.as_str(), quiet.err.as_str()), ("", ""), "--quiet says nothing");
+    let json = f.succeeds(&["run", "coin.pcad", "--seed", "1", "--steps", "200", "--json", "--out", "b"]);
+    assert_eq!(json.out.lines().count(), 1, "--json is one line: {}", json.out);
+    snapshot("coin_json", &serde_json::to_string_pretty(&timeless(&json.out)).unwrap());
+    snapshot("coin_notes", &json.err);
+    snapshot("coin_files", &f.files().join("\n"));
+    assert_eq!(draws(&f, "a", 4), draws(&f, "b", 4));
+    for (a, b) in [("a", "b")] {
+        assert_eq!(timeless(&f.read(&format!("{a}/summary.json"))), timeless(&f.read(&format!("{b}/summary.json"))));
+    }
+    let chain: Vec<String> = f.read("a/chain-1.csv").lines().take(8).map(str::to_owned).collect();
+    snapshot("coin_chain", &chain.join("\n"));
+    // The table ends with a line of time.
+    let plain = f.succeeds(&["run", "coin.pcad", "--seed", "1", "--steps", "200"]);
+    assert!(plain.out.contains("heads") && plain.out.contains("seed 1, 4 chains"), "{}", plain.out);
+    assert!(plain.out.trim_end().ends_with("runs/coin") && f.exists("runs/coin/report.html"), "{}", plain.out);
+    f.succeeds(&["run", "coin.pcad", "--seed", "1", "--steps", "200", "--quiet"]);
+    assert!(f.exists("runs/coin-2/report.html"));
+    // Another seed, other draws.
+    f.succeeds(&["run", "coin.pcad", "--seed", "2", "--steps", "200", "--quiet", "--out", "c"]);
+    assert_ne!(draws(&f, "a", 4), draws(&f, "c", 4));
+}
+
+/// The draws of each chain without comment lines.
+fn draws(f: &Folder, dir: &str, chains: usize) -> Vec<String> {
+    let chain = |i| {
+        let text = f.read(&format!("{dir}/chain-{i}.csv"));
+        text.lines().filter(|l| !l.starts_with('#')).map(|l| format!("{l}\n")).collect()
+    };
+    (1..=chains).map(chain).collect()
+}
+
+/// The shipped program on a small picture: the same draws, bit for bit, whatever computes them.
+#[test]
+fn the_lathe_draws_the_same_on_any_number_of_threads() {
+    let f = Folder::new("lathe");
+    f.write("disc.png", png(disc(64, 48, 34.0, 22.0, 15.0)));
+    let run = |out: &str, more: &[&str]| {
+        let mut args = vec!["run", "lathe.pcad", "--observe", "disc.png", "--set", "size=48", "--chains", "2"];
+        args.extend(["--steps", "60", "--warmup", "60", "--seed", "5", "--quiet", "--out", out]);
+        args.extend(more);
+        f.succeeds(&args);
+        let all = draws(&f, out, 2);
+        assert!(all.iter().all(|c| c.lines().count() > 5), "{all:?}");
+        assert!(all[0] != all[1], "chains differ");
+        all
+    };
+    let one = run("one", &["--threads", "1"]);
+    assert_eq!(one, run("two", &["--threads", "2"]));
+    assert_eq!(one, run("full", &["--threads", "2", "--no-incremental"]));
+    assert!(f.exists("one/best.obj") && f.exists("one/overlay.png") && f.exists("one/depth.npy"));
+}
+
+#[test]
+fn sheets_of_the_prior() {
+    let f = Folder::new("sheets");
+    snapshot("sample_coin", &session(&f, &["sample", "coin.pcad", "-n", "3"]));
+    f.write("disc.png", png(disc(64, 48, 34.0, 22.0, 15.0)));
+    snapshot("contours", &session(&f, &["contours", "disc.png"]));
+    assert_eq!(f.files(), ["contours.png", "disc.png"]);
+}
