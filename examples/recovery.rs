@@ -95,14 +95,14 @@ fn main() -> Result<(), pcadlang::Error> {
         let options = RunOptions { seed: case + 1, time: Some(Duration::from_secs(seconds)), ..RunOptions::default() };
         let posterior = model.run(&options, 2, 2)?;
         let quantities = posterior.quantities();
-        let error = |names: &[&str]| -> f64 {
-            let of = |n: &&str| {
-                let q: Option<&Quantity> = quantities.iter().find(|q| q.name == **n);
-                q.and_then(|q| truth(&mut t.clone(), n).map(|x| (q.summary.q50 - x).powi(2))).unwrap_or(f64::NAN)
-            };
-            names.iter().map(of).sum::<f64>().sqrt()
-        };
         let h = truth(&mut t, "H").unwrap_or(f64::NAN);
+        let mut error = |names: &[&str]| -> f64 {
+            let mut of = |n: &&str| {
+                let q: Option<&Quantity> = quantities.iter().find(|q| q.name == **n);
+                q.and_then(|q| truth(&mut t, n).map(|x| (q.summary.q50 - x).powi(2))).unwrap_or(f64::NAN)
+            };
+            names.iter().map(&mut of).sum::<f64>().sqrt()
+        };
         let profile: Vec<String> = (0..10).flat_map(|i| [format!("lower/r[{i}]"), format!("upper/r[{i}]")]).collect();
         let profile: Vec<&str> = profile.iter().map(String::as_str).collect();
         let e = [
