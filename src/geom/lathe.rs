@@ -44,7 +44,7 @@ pub(super) const SMALLEST: f64 = 1e-30;
 /// radius at least, measured along the radius only), and a floor of that thickness (half the height at most) where `caps`
 /// closes the bottom; without, `caps` says which ends get a disc.
 ///
-/// A profile that begins or ends at the axis (below 1e-4 of the object's size) is closed there whatever `caps` says, except
+/// A profile that begins or ends at the axis (below 1e-6 of the object's size) is closed there whatever `caps` says, except
 /// at the top of a vessel, which keeps a mouth. Radii at the axis between the ends make a thin neck.
 ///
 /// Parts are numbered: the `n` profiles in order from 0, then `n` rings at steps, `n + 1` the bottom disc, `n + 2` the top

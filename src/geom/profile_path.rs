@@ -12,7 +12,7 @@ const SMOOTH_COS: f64 = 0.766_044_443_118_978;
 /// across the axis), else a tip: the tangent of 20 degrees.
 const DOME_SLOPE: f64 = 0.363_970_234_266_202;
 /// Radii below this share of the size count as at the axis and are drawn as if they were it.
-const TIP: f64 = 1e-4;
+const TIP: f64 = 1e-6;
 /// An inner wall keeps at least this share of the outer radius.
 const LEAST_BORE: f64 = 0.02;
 
