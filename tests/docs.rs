@@ -24,7 +24,8 @@ fn the_reference_is_up_to_date() {
 fn the_programs_of_the_readme_run() {
     let readme = std::fs::read_to_string(concat!(env!("CARGO_MANIFEST_DIR"), "/README.md")).unwrap();
     let start = readme.find("    // line.pcad").expect("the README shows line.pcad");
-    let program: String = readme[start..].lines().take_while(|l| l.starts_with("    ")).map(|l| format!("{}\n", &l[4..])).collect();
+    let program: String =
+        readme[start..].lines().take_while(|l| l.starts_with("    ")).map(|l| format!("{}\n", &l[4..])).collect();
     let model = Model::from_text(&program).unwrap_or_else(|e| panic!("{e}"));
     let posterior = model.run(&RunOptions { seed: 1, ..RunOptions::default() }, 2, 2).unwrap_or_else(|e| panic!("{e}"));
     let slope = posterior.quantity("slope").unwrap().summary;
