@@ -21,7 +21,7 @@ fn open(s: &mut String, title: &str) {
 fn range(q: &Quantity) -> Option<(f64, f64)> {
     let all = || q.chains.iter().flatten().copied().filter(|x| x.is_finite());
     let (lo, hi) = (all().fold(f64::INFINITY, f64::min), all().fold(f64::NEG_INFINITY, f64::max));
-    (lo <= hi).then(|| if hi > lo { (lo, hi) } else { (lo - 0.5, hi + 0.5) })
+    (lo <= hi).then_some(if hi > lo { (lo, hi) } else { (lo - 0.5, hi + 0.5) })
 }
 
 /// The draws of each chain in order.
