@@ -218,7 +218,8 @@ fn balanced(case: &Case, kernel: &str, steps: usize) {
         let here: Vec<f64> = states.iter().map(|s| f64::from(u8::from(*s == i))).collect();
         let (m, se) = (mean(&here), standard_error(&here));
         assert!(se < 0.03, "{what}: run longer, se {se}");
-        assert!((m - expected).abs() < 5.0 * se + 1e-4, "{what}: cell {i} has {m} (se {se}), expected {expected}");
+        // A cell that is hardly ever visited has no honest standard error: a thousandth is as near as it gets.
+        assert!((m - expected).abs() < 5.0 * se + 1e-3, "{what}: cell {i} has {m} (se {se}), expected {expected}");
     }
 }
 
