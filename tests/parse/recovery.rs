@@ -67,8 +67,6 @@ fn one_mistake_is_one_error() {
         ("repeat 10", "repeat"),
         ("observe", "obs erve"),
         ("z;\n", "z"),
-        ("1 });", "1 )};"),
-        ("{ a", "a"),
         ("else", "otherwise"),
     ];
     for (from, to) in mistakes {
