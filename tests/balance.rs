@@ -130,6 +130,66 @@ const GAUSSIAN: Case = Case {
     },
 };
 
+/// The number of elements of an array depends on a choice: with another number they are all drawn anew.
+const ELEMENTS: Case = Case {
+    name: "elements",
+    text: "assume n ~ categorical([0.5, 0.3, 0.2]); assume z ~ iid(gamma(1, 1), n + 1);
+           observe normal(sum(z), 0.8) = 1.5;",
+    collect: "n, sum(z)",
+    cell: |d, i| d["n"][i] as usize * 2 + bin(d["sum(z)"][i], &[1.4]),
+    mass: || {
+        // A sum of n + 1 exponentials is gamma(n + 1, 1).
+        let f = |n: usize, x: f64| [0.5, 0.3, 0.2][n] * [1.0, x, x * x / 2.0][n] * (-x).exp() * normal_pdf(1.5, x, 0.8);
+        let row = |n| [(0.0, 1.4), (1.4, 10.0)].map(|(a, b)| integrate(|x| f(n, x), a, b, 2000));
+        normalised([row(0), row(1), row(2)].concat())
+    },
+};
+
+/// Choices that come into being when one of two points asks for them, and may be shared.
+const SHARED_GROUPS: Case = Case {
+    name: "mem",
+    text: "assume centre = mem(fn(k) { m ~ gamma(2, 1); m });
+           assume a ~ flip(0.5); assume b ~ flip(0.3);
+           observe normal(centre(a), 0.7) = 1; observe normal(centre(b), 0.7) = 2.2;",
+    collect: "a, b, centre(a)",
+    cell: |d, i| (d["a"][i] as usize * 2 + d["b"][i] as usize) * 2 + bin(d["centre(a)"][i], &[1.3]),
+    mass: || {
+        let prior = |m: f64| m * (-m).exp();
+        let near = |m: f64, y: f64| normal_pdf(y, m, 0.7);
+        let other = integrate(|m| prior(m) * near(m, 2.2), 0.0, 10.0, 2000);
+        let mut w = Vec::new();
+        for (a, b) in [(0, 0), (0, 1), (1, 0), (1, 1)] {
+            let p = 0.5 * if b == 1 { 0.3 } else { 0.7 };
+            for (lo, hi) in [(0.0, 1.3), (1.3, 10.0)] {
+                let f = |m: f64| prior(m) * near(m, 1.0) * if a == b { near(m, 2.2) } else { other };
+                w.push(p * integrate(f, lo, hi, 2000));
+            }
+        }
+        normalised(w)
+    },
+};
+
+/// An unbounded whole number, and a finite one whose range it is.
+const COUNTS: Case = Case {
+    name: "counts",
+    text: "assume n ~ poisson(2); assume k ~ binomial(n, 0.6); observe normal(k, 1) = 1.5;",
+    collect: "n, k",
+    cell: |d, i| (d["n"][i] as usize).min(4) * 3 + (d["k"][i] as usize).min(2),
+    mass: || {
+        let mut w = vec![0.0; 15];
+        let choose = |n: u32, k: u32| (0..k).map(|i| f64::from(n - i) / f64::from(i + 1)).product::<f64>();
+        let mut poisson = (-2.0f64).exp();
+        for n in 0..30u32 {
+            for k in 0..=n {
+                let p = choose(n, k) * 0.6f64.powi(k as i32) * 0.4f64.powi((n - k) as i32);
+                w[(n.min(4) * 3 + k.min(2)) as usize] += poisson * p * normal_pdf(1.5, f64::from(k), 1.0);
+            }
+            poisson *= 2.0 / f64::from(n + 1);
+        }
+        normalised(w)
+    },
+};
+
 /// Runs a kernel for long and judges it.
 fn balanced(case: &Case, kernel: &str, steps: usize) {
     let what = format!("{}, {kernel}", case.name);
@@ -186,7 +246,7 @@ fn discrete_choices() {
         with_mh!("mh(@b)"),
         with_mh!("drift(@a, 1)"),
     ];
-    all_balanced(&DISCRETE, 60_000, &kernels);
+    all_balanced(&DISCRETE, 30_000, &kernels);
 }
 
 #[test]
@@ -202,7 +262,7 @@ fn choices_that_appear_and_vanish() {
         with_mh!("drift($continuous, 0.8)"),
         with_mh!("block(@x/**)"),
     ];
-    all_balanced(&STRUCTURE, 80_000, &kernels);
+    all_balanced(&STRUCTURE, 40_000, &kernels);
 }
 
 #[test]
@@ -215,7 +275,7 @@ fn one_address_in_two_branches() {
         with_mh!("gibbs(@c)"),
         with_mh!("drift(@x/a, 0.8)"),
     ];
-    all_balanced(&SHARED, 80_000, &kernels);
+    all_balanced(&SHARED, 40_000, &kernels);
 }
 
 #[test]
@@ -227,7 +287,45 @@ fn values_that_depend_on_another_choice() {
         "mix { 0.5 => drift(one(@**), 1); 0.5 => block(@**); }",
         "mix { 0.5 => gibbs(one(@**)); 0.5 => block(@**); }",
     ];
-    all_balanced(&FINITE_SUPPORT, 80_000, &kernels);
+    all_balanced(&FINITE_SUPPORT, 40_000, &kernels);
+}
+
+#[test]
+fn arrays_that_change_length() {
+    let kernels = [
+        "mh(one(@**))",
+        "block(@**)",
+        "drift(one(@**), 0.8)",
+        "drift(@**, 0.6)",
+        "mix { 0.5 => gibbs(@n); 0.5 => drift(@z, 0.7); }",
+        with_mh!("drift(one(@z), 0.7)"),
+    ];
+    all_balanced(&ELEMENTS, 40_000, &kernels);
+}
+
+#[test]
+fn shared_choices_that_appear_and_vanish() {
+    let kernels = [
+        "mh(one(@**))",
+        "block(@**)",
+        "drift(one(@**), 0.8)",
+        with_mh!("drift(@**, 0.6)"),
+        "mix { 0.5 => gibbs(one($finite)); 0.5 => drift($continuous, 0.8); }",
+        "mix { 0.5 => block(one($finite)); 0.5 => mh(one($continuous)); }",
+    ];
+    all_balanced(&SHARED_GROUPS, 40_000, &kernels);
+}
+
+#[test]
+fn unbounded_whole_numbers() {
+    let kernels = [
+        "mh(one(@**))",
+        "block(@**)",
+        "drift(one(@**), 1)",
+        with_mh!("drift(@**, 1)"),
+        "mix { 0.5 => gibbs(@k); 0.5 => drift(@n, 2); }",
+    ];
+    all_balanced(&COUNTS, 40_000, &kernels);
 }
 
 #[test]
@@ -240,7 +338,7 @@ fn bounds_that_depend_on_another_choice() {
         with_mh!("drift(@p1, 1)"),
         with_mh!("mh(@p2)"),
     ];
-    all_balanced(&SUPPORT, 80_000, &kernels);
+    all_balanced(&SUPPORT, 40_000, &kernels);
 }
 
 #[test]
@@ -255,7 +353,7 @@ fn gaussian_choices() {
         "mh(one(@**))",
         "block(@**)",
     ];
-    all_balanced(&GAUSSIAN, 80_000, &kernels);
+    all_balanced(&GAUSSIAN, 40_000, &kernels);
 }
 
 /// Getting it right (Geweke 2004): data drawn anew given the parameters, then the parameters moved given the data, by turns.
@@ -269,16 +367,16 @@ fn parameters_and_data_by_turns() {
             "assume s ~ gamma(3, 3); assume m ~ normal(0, 1); assume w ~ beta(2, 2);
              for i in 0 .. 3 {{ y[i] ~ normal(m + w, s); }}
              observe normal(0 * sum(map(fn(i) {{ y[i] }}, 0 .. 3)), 1) = 0;
-             infer {{ repeat 60000 {{ {k}; block(@y); collect s, m, w, y[0] * y[1], m * m, s * s; }} }}"
+             infer {{ repeat 30000 {{ {k}; block(@y); collect s, m, w, y[0] * y[1], m * m, s * s; }} }}"
         );
         let d = run(&text, 7, 2);
         // gamma(3, rate 3): mean 1, mean square 4/3; beta(2, 2): mean 1/2, mean square 3/10.
-        assert_mean(&format!("{kernel} s"), &d["s"], 1.0, 0.1);
-        assert_mean(&format!("{kernel} s^2"), &d["s * s"], 4.0 / 3.0, 0.3);
-        assert_mean(&format!("{kernel} m"), &d["m"], 0.0, 0.15);
-        assert_mean(&format!("{kernel} m^2"), &d["m * m"], 1.0, 0.25);
+        assert_mean(&format!("{kernel} s"), &d["s"], 1.0, 0.15);
+        assert_mean(&format!("{kernel} s^2"), &d["s * s"], 4.0 / 3.0, 0.4);
+        assert_mean(&format!("{kernel} m"), &d["m"], 0.0, 0.25);
+        assert_mean(&format!("{kernel} m^2"), &d["m * m"], 1.0, 0.4);
         assert_mean(&format!("{kernel} w"), &d["w"], 0.5, 0.05);
-        assert_mean(&format!("{kernel} y0 y1"), &d["y[0] * y[1]"], 1.3, 0.3);
+        assert_mean(&format!("{kernel} y0 y1"), &d["y[0] * y[1]"], 1.3, 0.5);
     }
 }
 

@@ -125,7 +125,7 @@ fn chamfer_agrees_with_a_grid() {
 
 #[test]
 fn contour_ratio_agrees_with_a_grid() {
-    agrees("scene.contour(view, size = 48, weight = 0.05)", 15, 4000);
+    agrees("scene.contour(view, size = 48, sd = 1.5, truncate = 8, weight = 0.01)", 15, 4000);
 }
 
 #[test]
@@ -133,5 +133,5 @@ fn contour_ratio_agrees_with_a_grid() {
 fn all_likelihoods_agree_with_a_fine_grid() {
     agrees("scene.chamfer(view, sigma = 0.7, size = 48)", 36, 60_000);
     agrees("scene.chamfer(view, sigma = 0.7, symmetric = true, size = 48)", 36, 60_000);
-    agrees("scene.contour(view, size = 48, weight = 0.1)", 36, 60_000);
+    agrees("scene.contour(view, size = 48, sd = 1.5, truncate = 8, weight = 0.02)", 36, 60_000);
 }

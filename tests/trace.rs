@@ -64,6 +64,13 @@ const PROGRAMS: &[(&str, &str)] = &[
          observe normal(z + f[0] + w[k], 0.5) = [1, 2, 0, 1];",
     ),
     (
+        "lengths",
+        "assume n ~ categorical([0.5, 0.3, 0.2]); assume z ~ iid(gamma(1, 1), n + 1); assume t = sum(z) * 2;
+         assume v ~ dirichlet(map(fn(i) { 1 + n }, 0 .. n + 2)); assume d = if n == 1 { flip(0.3) } else { poisson(2) };
+         assume k ~ d; w[n] ~ normal(0, 1);
+         observe normal(t + v[0] + (if k == 1 { 1 } else { 0 }) + w[n], 0.8) = 1.5;",
+    ),
+    (
         "closures",
         "fn make(a) { b ~ normal(a, 1); fn(x) { c ~ normal(0, 1); x + b + c } }
          assume g = make(1); assume h = if k { make(2) } else { g };

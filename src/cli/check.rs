@@ -23,11 +23,11 @@ pub fn check(a: &Check) -> Result<(), Failure> {
                 println!("{path}: no mistakes found");
                 for p in interface.params {
                     let (default, help) = (p.default.unwrap_or_default(), p.help.unwrap_or_default());
-                    println!("  --set {} = {default}  {help}", p.name);
+                    println!("{}", format!("  --set {} = {default}  {help}", p.name).trim_end());
                 }
                 for d in interface.data.iter().filter(|d| !d.has_default) {
                     let (ty, help) = (d.ty.as_deref().unwrap_or("any"), d.help.as_deref().unwrap_or_default());
-                    println!("  --observe {}=FILE ({ty})  {help}", d.name);
+                    println!("{}", format!("  --observe {}=FILE ({ty})  {help}", d.name).trim_end());
                 }
             }
             Err(e) => {

@@ -1,4 +1,6 @@
-//! Placements: affine maps of the world.
+//! Placements: affine maps of the world. They neither check their numbers nor know what they place.
+//!
+//! Invariant: the same arguments give the same bits on every machine (sines and cosines are `libm`'s).
 
 use glam::{DAffine3, DMat3, DVec3};
 use std::ops::Mul;
@@ -27,8 +29,9 @@ impl Affine {
         self.0.matrix3 * p + self.0.translation
     }
 
-    /// What takes normals along: the cofactor matrix, which is the determinant times the inverse transpose. Outward normals
-    /// stay outward also when the map mirrors, and it exists when the map is singular. Its results are not unit vectors.
+    /// What takes normals along: the cofactor matrix times the sign of the determinant, which is the inverse transpose times
+    /// the size of the determinant. Outward normals stay outward also when the map mirrors, and it exists when the map is
+    /// singular. Its results are not unit vectors.
     pub fn normal_matrix(&self) -> DMat3 {
         let m = self.0.matrix3;
         let cofactor = DMat3::from_cols(m.y_axis.cross(m.z_axis), m.z_axis.cross(m.x_axis), m.x_axis.cross(m.y_axis));
@@ -95,5 +98,33 @@ mod tests {
             assert!(m.dot(u).abs() < 1e-12);
             assert!(m.dot(a.0.matrix3 * n) > 0.0, "points the same way as the image of the outside");
         }
+    }
+
+    #[test]
+    fn products_apply_the_right_one_first() {
+        let a = Affine::new(DVec3::new(1.0, -2.0, 0.5), DVec3::new(0.3, 0.2, -0.5), DVec3::new(1.5, 0.5, 2.0));
+        let b = Affine::new(DVec3::new(0.0, 3.0, 1.0), DVec3::new(-1.3, 0.0, 0.8), DVec3::new(-1.0, 0.7, 1.1));
+        let p = DVec3::new(0.3, 0.4, 0.5);
+        assert!(((a * b).point(p) - a.point(b.point(p))).length() < 1e-13);
+        assert!(((b * a).point(p) - a.point(b.point(p))).length() > 0.1);
+        assert_eq!((a * Affine::IDENTITY, Affine::IDENTITY * a), (a, a));
+        let (am, bm) = (a.0.matrix3, b.0.matrix3);
+        let by_hand = am * (bm * p + b.0.translation) + a.0.translation;
+        assert!(((a * b).point(p) - by_hand).length() < 1e-13);
+        assert!((a * b).is_mirrored() && !a.is_mirrored());
+    }
+
+    #[test]
+    fn normal_matrix_is_the_scaled_inverse_transpose() {
+        for scale in [DVec3::new(1.5, 0.5, 2.0), DVec3::new(1.5, -0.5, 2.0)] {
+            let a = Affine::new(DVec3::ONE, DVec3::new(0.3, 0.2, -0.5), scale);
+            let expected = a.0.matrix3.determinant().abs() * a.0.matrix3.inverse().transpose();
+            assert!((a.normal_matrix() - expected).to_cols_array().iter().all(|x| x.abs() < 1e-14));
+        }
+        // Squashed into the plane y = 0, whose normal remains.
+        let flat = Affine::new(DVec3::ZERO, DVec3::ZERO, DVec3::new(2.0, 0.0, 3.0));
+        assert_eq!(flat.normal_matrix() * DVec3::Y, DVec3::Y * 6.0);
+        assert_eq!(flat.normal_matrix() * DVec3::X, DVec3::ZERO);
+        assert!(!Affine::new(DVec3::splat(f64::NAN), DVec3::ZERO, DVec3::ONE).is_finite());
     }
 }

@@ -1,15 +1,16 @@
-//! Boxes.
+//! Boxes with sides along the axes: one part, a crease at every edge.
 
+use super::lathe::SMALLEST;
 use super::{GeomError, Mesh};
 use glam::{DVec3, Vec3};
 
 /// A box round the origin with these edge lengths.
 ///
 /// # Errors
-/// Unless all are positive and finite.
+/// Unless all are from 1e-30 to 1e6.
 pub fn cuboid(size: DVec3) -> Result<Mesh, GeomError> {
-    if !(size.is_finite() && size.min_element() > 0.0 && size.max_element() < 1e6) {
-        return Err(GeomError::domain(format!("box: the edge lengths must be positive, got {size}")));
+    if !size.to_array().iter().all(|x| (SMALLEST..=1e6).contains(x)) {
+        return Err(GeomError::domain(format!("box: the edge lengths must be from 1e-30 to 1e6, got {size}")));
     }
     let half = (0.5 * size).as_vec3();
     let corner = |i: u32| Vec3::from_array([0, 1, 2].map(|a| if i >> a & 1 == 1 { half[a] } else { -half[a] }));

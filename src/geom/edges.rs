@@ -1,4 +1,7 @@
 //! From loose triangles to a mesh: welding, the table of edges, creases, smooth normals.
+//!
+//! Does not check its input ([`Mesh::new`] does). Invariant: the result depends on the order of the faces alone, never on
+//! that of a hash table; every edge of every face is in the table once.
 
 use super::mesh::CREASE_DEGREES;
 use super::{Edge, Mesh, NO_FACE, Topology};
@@ -118,4 +121,60 @@ fn smoothing_groups(faces: &[[u32; 3]], edges: &[(usize, usize, u32, bool)]) -> 
         }
     }
     (0..parent.len() as u32).map(|x| root(&mut parent, x)).collect()
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    /// Two unit squares' halves that share the z axis' edge, the second turned up by an angle.
+    fn hinge(degrees: f32) -> Mesh {
+        let (s, c) = degrees.to_radians().sin_cos();
+        let p = vec![Vec3::ZERO, Vec3::Z, Vec3::X, Vec3::Z, Vec3::new(-0.0, 0.0, 0.0), Vec3::new(-c, s, 0.0)];
+        Mesh::new(p, vec![[0, 1, 2], [3, 4, 5]], vec![0, 3]).unwrap()
+    }
+
+    #[test]
+    fn equal_positions_are_one_point_and_sharp_edges_split_it() {
+        for (degrees, crease, vertices) in [(0.0, false, 4), (39.0, false, 4), (41.0, true, 6), (150.0, true, 6)] {
+            let m = hinge(degrees);
+            assert_eq!(m.positions.len(), vertices, "{degrees} degrees");
+            let shared: Vec<&Edge> = m.topology.edges.iter().filter(|e| e.faces[1] != NO_FACE).collect();
+            assert_eq!((m.topology.edges.len(), shared.len()), (5, 1));
+            assert_eq!((shared[0].faces, shared[0].crease), ([0, 1], crease));
+            assert_eq!(shared[0].vertices, [m.topology.triangles[0][0], m.topology.triangles[0][1]]);
+            assert_eq!((m.topology.parts.as_slice(), m.topology.part_count), (&[0, 3][..], 4));
+        }
+        // Smooth: both faces have the same angle at the origin, so the normal there halves the 39 degrees.
+        let m = hinge(39.0);
+        let (s, c) = 19.5f32.to_radians().sin_cos();
+        assert!((m.normals[m.topology.triangles[0][0] as usize] - Vec3::new(s, c, 0.0)).length() < 1e-6);
+    }
+
+    #[test]
+    fn normals_are_weighted_by_angle() {
+        // A right angle made of one face on one side of the crease-free ridge and of two on the other counts the same.
+        let up = Vec3::new(0.0, 0.2, 0.0);
+        let p = vec![up, Vec3::new(0.0, 0.2, 1.0), Vec3::X, Vec3::new(1.0, 0.0, 1.0), -Vec3::X];
+        let one = Mesh::new(p.clone(), vec![[0, 1, 2], [0, 4, 1]], vec![0; 2]).unwrap();
+        let two = Mesh::new(
+            p.iter().copied().chain([(up + p[1]) * 0.25 + Vec3::X * 0.5]).collect(),
+            vec![[0, 1, 5], [0, 5, 2], [0, 4, 1]],
+            vec![0; 3],
+        )
+        .unwrap();
+        let at_top = |m: &Mesh| m.normals[m.positions.iter().position(|q| *q == up).unwrap()];
+        assert!(at_top(&one).x.abs() < 1e-6, "equal angles on both sides");
+        assert!((at_top(&one) - at_top(&two)).length() < 2e-2);
+    }
+
+    #[test]
+    fn three_faces_at_an_edge_make_a_pair_and_a_boundary() {
+        let p = vec![Vec3::ZERO, Vec3::Z, Vec3::X, -Vec3::X, Vec3::Y];
+        let m = Mesh::new(p, vec![[0, 1, 2], [1, 0, 3], [0, 1, 4], [2, 2, 0]], vec![0; 4]).unwrap();
+        assert_eq!(m.topology.triangles.len(), 3, "the face without area is dropped");
+        assert_eq!(m.topology.edges.len(), 8);
+        let sides: usize = m.topology.edges.iter().map(|e| if e.faces[1] == NO_FACE { 1 } else { 2 }).sum();
+        assert_eq!(sides, 9, "every side of every face is in the table once");
+    }
 }

@@ -50,13 +50,16 @@ pub struct Mesh {
 pub const CREASE_DEGREES: f64 = 40.0;
 /// The largest mesh, in triangles.
 pub const MOST_TRIANGLES: usize = 5_000_000;
+/// The most parts of a mesh; `u16::MAX` is not the number of one.
+pub const MOST_PARTS: usize = u16::MAX as usize;
 
 impl Mesh {
     /// A mesh from positions and triangles, with the part of each triangle. Equal positions are one point; triangles
     /// without area are dropped; normals are means over the faces around a point, weighted by angle, within creases.
     ///
     /// # Errors
-    /// If a position is not finite, an index out of range, nothing is left, or there are more than five million triangles.
+    /// If a position is not finite, an index out of range, a part number 65535, nothing is left, there is not one part
+    /// number for each triangle, or there are more than five million triangles.
     pub fn new(positions: Vec<Vec3>, triangles: Vec<[u32; 3]>, parts: Vec<u16>) -> Result<Mesh, GeomError> {
         if triangles.len() > MOST_TRIANGLES {
             return Err(GeomError::invalid(format!(
@@ -66,6 +69,9 @@ impl Mesh {
         }
         if parts.len() != triangles.len() {
             return Err(GeomError::invalid("a mesh needs one part number for each triangle"));
+        }
+        if parts.contains(&u16::MAX) {
+            return Err(GeomError::invalid(format!("a mesh has at most {MOST_PARTS} parts, numbered from 0")));
         }
         if let Some(i) = positions.iter().position(|p| !p.is_finite()) {
             return Err(GeomError::invalid(format!("vertex {i} of the mesh is not finite: {}", positions[i])));
@@ -98,7 +104,11 @@ mod tests {
         assert!(Mesh::new(p.clone(), vec![[0, 1, 1]], vec![0]).is_err());
         assert!(Mesh::new(vec![Vec3::ZERO, Vec3::X, Vec3::new(0.0, f32::NAN, 0.0)], vec![[0, 1, 2]], vec![0]).is_err());
         assert!(Mesh::new(p.clone(), vec![], vec![]).is_err());
-        assert!(Mesh::new(p, vec![[0, 1, 2]], vec![]).is_err());
+        assert!(Mesh::new(p.clone(), vec![[0, 1, 2]], vec![]).is_err());
+        let e = Mesh::new(p.clone(), vec![[0, 1, 2]], vec![u16::MAX]).unwrap_err().to_string();
+        assert_eq!(e, "a mesh has at most 65535 parts, numbered from 0");
+        let e = Mesh::new(p, vec![[0, 1, 2]; MOST_TRIANGLES + 1], vec![]).unwrap_err().to_string();
+        assert_eq!(e, "a mesh of 5000001 triangles; at most 5000000");
     }
 
     #[test]

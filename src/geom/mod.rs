@@ -11,6 +11,7 @@ pub mod glb;
 mod lathe;
 mod mesh;
 pub mod obj;
+mod profile_path;
 mod revolve;
 mod solid;
 mod sphere;

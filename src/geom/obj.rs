@@ -1,35 +1,39 @@
 //! Wavefront OBJ: reading through `tobj`, after a look at the text that says which line is wrong; writing.
+//!
+//! Materials, colours, texture coordinates and the file's own normals are not read: normals are made anew by [`Mesh::new`].
+//! Invariant: `tobj` sees only finite vertices and faces whose corners are there, so no bytes can make it stumble.
 
-use super::mesh::MOST_TRIANGLES;
+use super::mesh::{MOST_PARTS, MOST_TRIANGLES};
 use super::{GeomError, Mesh};
 use glam::Vec3;
+use rustc_hash::FxHashMap;
 use std::fmt::Write;
 
-/// Reads a mesh; each object or group of the file is a part. Polygons are cut into triangles, materials ignored.
+/// The most corners of a polygon.
+const MOST_CORNERS: usize = 1000;
+
+/// Reads a mesh; each object or group of the file is a part, numbered by first use, and one opened again goes on. Polygons
+/// are cut into triangles as fans. A fourth coordinate divides the others.
 ///
 /// # Errors
-/// If it is not text, a line is malformed, a coordinate is not finite, a face uses a vertex that is not there, or nothing
-/// has an area: with the number of the line.
+/// [`GeomError::Invalid`] if it is not text, a line is malformed, a coordinate is not finite, a face uses a vertex that is
+/// not there before it, there are more than 65535 parts or five million triangles: with the number of the line. If there
+/// are no faces or none has an area.
 pub fn load(bytes: &[u8]) -> Result<Mesh, GeomError> {
     let text = std::str::from_utf8(bytes)
         .map_err(|e| GeomError::invalid(format!("the OBJ file is not text (byte {})", e.valid_up_to())))?;
-    check(text)?;
-    let options = tobj::LoadOptions {
-        triangulate: true,
-        ignore_points: true,
-        ignore_lines: true,
-        single_index: false,
-        ..tobj::LoadOptions::default()
-    };
+    let plain = plain(text)?;
+    let options = tobj::LoadOptions { triangulate: true, ignore_points: true, ignore_lines: true, single_index: false };
     let no_materials = |_: &std::path::Path| Ok((Vec::new(), Default::default()));
-    let (models, _) = tobj::load_obj_buf(&mut &*bytes, &options, no_materials)
-        .map_err(|e| GeomError::invalid(format!("the OBJ file cannot be read: {e}")))?;
+    let unreadable = |e: &dyn std::fmt::Display| GeomError::invalid(format!("the OBJ file cannot be read: {e}"));
+    let (models, _) = tobj::load_obj_buf(&mut plain.as_bytes(), &options, no_materials).map_err(|e| unreadable(&e))?;
     let (mut positions, mut triangles, mut parts) = (Vec::new(), Vec::new(), Vec::new());
-    for (i, m) in models.iter().enumerate() {
+    for m in models.iter().filter(|m| !m.mesh.indices.is_empty()) {
+        let part: u16 = m.name.parse().map_err(|e| unreadable(&e))?;
         let first = positions.len() as u32;
         positions.extend(m.mesh.positions.chunks_exact(3).map(Vec3::from_slice));
         triangles.extend(m.mesh.indices.chunks_exact(3).map(|t| [t[0] + first, t[1] + first, t[2] + first]));
-        parts.resize(triangles.len(), i.min(usize::from(u16::MAX - 1)) as u16);
+        parts.resize(triangles.len(), part);
     }
     if triangles.is_empty() {
         return Err(GeomError::invalid("the OBJ file has no faces"));
@@ -37,51 +41,91 @@ pub fn load(bytes: &[u8]) -> Result<Mesh, GeomError> {
     Mesh::new(positions, triangles, parts)
 }
 
-/// Finds the line that is wrong.
-fn check(text: &str) -> Result<(), GeomError> {
+/// Checks a file, line by line, and keeps the vertices, the faces' vertex numbers counted from the start, and the parts,
+/// as `g` with a number.
+fn plain(text: &str) -> Result<String, GeomError> {
+    let mut out = String::with_capacity(text.len());
     let (mut vertices, mut triangles) = (0i64, 0usize);
+    let mut names: FxHashMap<&str, usize> = FxHashMap::default();
+    let (mut name, mut open) = ("", None);
     for (i, line) in text.lines().enumerate() {
-        let at = |what: String| Err(GeomError::invalid(format!("line {} of the OBJ file: {what}", i + 1)));
+        let at = |what: String| GeomError::invalid(format!("line {} of the OBJ file: {what}", i + 1));
         let mut words = line.split_whitespace();
         match words.next() {
             Some("v") => {
+                let p = vertex(words).map_err(at)?;
                 vertices += 1;
-                let mut count = 0;
-                for w in words.take(3) {
-                    match w.parse::<f32>() {
-                        Ok(x) if x.is_finite() => count += 1,
-                        _ => return at(format!("a coordinate must be a finite number, got `{w}`")),
-                    }
-                }
-                if count < 3 {
-                    return at("a vertex needs three coordinates".into());
-                }
+                let _ = writeln!(out, "v {} {} {}", p[0], p[1], p[2]);
             }
             Some("f") => {
-                let mut corners = 0;
-                for w in words {
-                    corners += 1;
-                    let number = w.split('/').next().unwrap_or_default();
-                    let Ok(v) = number.parse::<i64>() else {
-                        return at(format!("a corner must be the number of a vertex, got `{w}`"));
-                    };
-                    let place = if v < 0 { vertices + v } else { v - 1 };
-                    if place < 0 || place >= vertices {
-                        return at(format!("there is no vertex {v}; there are {vertices} so far"));
-                    }
-                }
-                if corners > 1000 {
-                    return at(format!("a face with {corners} corners; at most 1000"));
-                }
-                triangles += corners.max(2) - 2;
+                let corners = face(words, vertices).map_err(at)?;
+                triangles += corners.len() - 2;
                 if triangles > MOST_TRIANGLES {
-                    return at(format!("more than {MOST_TRIANGLES} triangles"));
+                    return Err(at(format!("more than {MOST_TRIANGLES} triangles")));
                 }
+                let next = names.len();
+                let part = *names.entry(name).or_insert(next);
+                if part >= MOST_PARTS {
+                    return Err(at(format!("more than {MOST_PARTS} objects and groups")));
+                }
+                if open != Some(part) {
+                    let _ = writeln!(out, "g {part}");
+                    open = Some(part);
+                }
+                out.push('f');
+                for c in &corners {
+                    let _ = write!(out, " {c}");
+                }
+                out.push('\n');
             }
+            Some(word @ ("o" | "g")) => name = line.trim_start().strip_prefix(word).unwrap_or_default().trim(),
             _ => {}
         }
     }
-    Ok(())
+    Ok(out)
+}
+
+/// The numbers after `v`: three coordinates, or four, or three and three of a colour.
+fn vertex<'a>(words: impl Iterator<Item = &'a str>) -> Result<[f32; 3], String> {
+    let mut x = [0.0f32; 7];
+    let mut count = 0;
+    for w in words {
+        let finite = w.parse::<f32>().ok().filter(|x| x.is_finite());
+        let number = finite.ok_or_else(|| format!("a coordinate must be a finite number, got `{w}`"))?;
+        *x.get_mut(count).ok_or("a vertex with more than 7 numbers")? = number;
+        count += 1;
+    }
+    if count < 3 {
+        return Err("a vertex needs three coordinates".into());
+    }
+    let p = [x[0], x[1], x[2]];
+    if count != 4 {
+        return Ok(p);
+    }
+    let p = p.map(|a| a / x[3]);
+    if p.iter().all(|a| a.is_finite()) {
+        Ok(p)
+    } else {
+        Err(format!("the coordinates divided by {} are not finite", x[3]))
+    }
+}
+
+/// The numbers after `f`: corners, counted from 1.
+fn face<'a>(words: impl Iterator<Item = &'a str>, vertices: i64) -> Result<Vec<i64>, String> {
+    let mut corners = Vec::with_capacity(4);
+    for w in words {
+        let number = w.split('/').next().unwrap_or_default();
+        let v = number.parse::<i64>().map_err(|_| format!("a corner must be the number of a vertex, got `{w}`"))?;
+        let place = if v < 0 { vertices.saturating_add(v).saturating_add(1) } else { v };
+        if !(1..=vertices).contains(&place) {
+            return Err(format!("there is no vertex {v}; there are {vertices} so far"));
+        }
+        corners.push(place);
+        if corners.len() > MOST_CORNERS {
+            return Err(format!("a face with more than {MOST_CORNERS} corners"));
+        }
+    }
+    if corners.len() < 3 { Err(format!("a face needs three corners, got {}", corners.len())) } else { Ok(corners) }
 }
 
 /// The text of an OBJ file with positions, normals and one group for each part.
@@ -137,6 +181,22 @@ mod tests {
         assert_eq!(fails("v 1 1e99 2\n"), "line 1 of the OBJ file: a coordinate must be a finite number, got `1e99`");
         assert_eq!(fails(""), "the OBJ file has no faces");
         assert_eq!(fails("v 0 0 0\nf 1 1 1\n"), "the mesh has no triangle with an area");
+        let three = "v 0 0 0\nv 1 0 0\nv 0 1 0\n";
+        assert_eq!(fails(&format!("{three}f 1 2\n")), "line 4 of the OBJ file: a face needs three corners, got 2");
+        assert_eq!(
+            fails(&format!("{three}f 0 1 2\n")),
+            "line 4 of the OBJ file: there is no vertex 0; there are 3 so far"
+        );
+        assert!(
+            fails(&format!("{three}f 1 2 -9223372036854775808\n")).contains("there is no vertex -9223372036854775808")
+        );
+        assert!(fails(&format!("{three}f 1 2 /3\n")).ends_with("a corner must be the number of a vertex, got `/3`"));
+        assert!(fails("v 1 1 1 0\n").starts_with("line 1 of the OBJ file: the coordinates divided by 0"));
+        assert!(fails("v 3e38 1 1 1e-9\n").contains("not finite"));
+        assert!(fails("v 1 2 3 4 5 6 7 8\n").contains("more than 7"));
+        assert!(fails(&format!("{three}f{}\n", " 1 2 3".repeat(400))).contains("more than 1000 corners"));
+        let many = (0..65537).fold(three.to_string(), |s, i| s + &format!("g {i}\nf 1 2 3\n"));
+        assert_eq!(fails(&many), format!("line {} of the OBJ file: more than 65535 objects and groups", 3 + 2 * 65536));
         assert!(load(&[0x66, 0xff, 0x20]).unwrap_err().to_string().contains("not text"));
     }
 
@@ -147,10 +207,64 @@ mod tests {
         assert_eq!((m.topology.triangles.len(), m.topology.part_count), (3, 2));
     }
 
+    #[test]
+    fn what_is_not_geometry_is_passed_over() {
+        let text = "# a\nmtllib no such.mtl\ng a\nv 0 0 0 1 0 0\nv 2 0 0\nv 0 4 0 2\nvt nan\nvn 1\nusemtl x\n\
+                    f 1/9/-7 2/x 3//\nl 1 99\ng b\nusemtl\nf -3 -1 -2\ng a\nf 1 2 3\n";
+        let m = load(text.as_bytes()).unwrap();
+        assert_eq!(m.topology.parts, [0, 1, 0], "a group opened again goes on");
+        assert_eq!(m.bounds().unwrap().max, glam::DVec3::new(2.0, 2.0, 0.0), "the fourth number divides");
+    }
+
+    #[test]
+    fn parts_and_shape_survive() {
+        let stack =
+            [Profile { y: vec![0.0, 1.0], r: vec![0.5, 0.5] }, Profile { y: vec![1.0, 2.0], r: vec![0.3, 0.0] }];
+        let m = lathe(&stack, 9, 0.0, Caps::Both).unwrap();
+        let back = load(write(&m).as_bytes()).unwrap();
+        let corners =
+            |m: &Mesh| m.topology.triangles.iter().flatten().map(|v| m.positions[*v as usize]).collect::<Vec<_>>();
+        let faces_of = |m: &Mesh| {
+            let mut sizes: Vec<usize> =
+                (0..m.topology.part_count).map(|p| m.topology.parts.iter().filter(|q| **q == p).count()).collect();
+            sizes.retain(|n| *n > 0);
+            sizes.sort_unstable();
+            sizes
+        };
+        let sorted = |m: &Mesh| {
+            let mut c: Vec<[u32; 9]> = corners(m)
+                .chunks_exact(3)
+                .map(|t| std::array::from_fn(|i| (t[i / 3][i % 3] + 0.0).to_bits()))
+                .collect();
+            c.sort_unstable();
+            c
+        };
+        assert_eq!(sorted(&back), sorted(&m), "single precision survives the text");
+        assert_eq!(faces_of(&back), faces_of(&m));
+        assert_eq!(write(&load(write(&back).as_bytes()).unwrap()), write(&back));
+    }
+
     proptest::proptest! {
         #[test]
-        fn no_bytes_make_it_panic(text in "([vf] ?(-?[0-9]{1,3}(/[0-9]{0,2})?|nan|inf|#| |\n){0,6}\n){0,8}") {
+        fn no_text_makes_it_panic(text in "([vf] ?(-?[0-9]{1,3}(/[0-9]{0,2})?|nan|inf|#| |\n){0,6}\n){0,8}") {
             let _ = load(text.as_bytes());
+        }
+
+        #[test]
+        fn no_lines_make_it_panic(
+            lines in proptest::collection::vec("(v|vt|vn|f|l|p|o|g|usemtl|mtllib|s|é|\\\\)( -?[0-9]{0,20}(/-?[0-9]{0,20}){0,3}| [0-9.e-]{1,6}){0,6}", 0..12),
+            faces in proptest::collection::vec((-5i64..5, -5i64..5, -5i64..5), 0..6),
+        ) {
+            let corners = faces.iter().map(|(a, b, c)| format!("f {a} {b}/{c} {c}//{a}\n"));
+            let text = lines.join("\n") + "\nv 0 0 0\nv 1 0 0\nv 0 1 0\nv 0 0 1\n" + &corners.collect::<String>();
+            if let Ok(m) = load(text.as_bytes()) {
+                proptest::prop_assert!(m.positions.iter().chain(&m.normals).all(|p| p.is_finite()));
+            }
+        }
+
+        #[test]
+        fn no_bytes_make_it_panic(bytes in proptest::collection::vec(proptest::num::u8::ANY, 0..200)) {
+            let _ = load(&bytes);
         }
     }
 }

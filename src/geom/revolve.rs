@@ -1,8 +1,9 @@
 //! Surfaces of revolution round the y axis, from a path in the half plane (r, y).
 //!
 //! The path runs with the outside on its right: up along an outer wall, inwards over a top. It is cut into strips that are
-//! smooth in themselves; between strips the surface has a crease. Topology depends on the numbers of points only and is
+//! smooth in themselves; between strips the surface has a crease unless a strip says otherwise. Topology depends on the numbers of points only and is
 //! shared between surfaces of the same numbers: positions and normals are all that a new profile costs.
+//! Invariant: the mesh is the same whether its topology was found in the cache or not.
 
 use super::edges::pair_edges;
 use super::{Edge, Mesh, Topology};
@@ -17,6 +18,8 @@ pub(super) struct Strip {
     pub points: Vec<(f64, f64)>,
     /// The part of each segment.
     pub parts: Vec<u16>,
+    /// Whether the seam to the strip before is no crease although its normals differ.
+    pub blend: bool,
 }
 
 /// What the topology of a surface depends on.
@@ -25,21 +28,18 @@ struct Signature {
     sides: u32,
     closed: bool,
     part_count: u16,
-    /// For each strip: points, pole at its start, pole at its end; then the parts of its segments.
+    /// For each strip: points, poles and blend; then the parts of its segments.
     strips: Vec<u32>,
 }
 
 /// Sweeps strips, each beginning where the one before ends; `closed` joins the last to the first.
 pub(super) fn revolve(strips: &[Strip], sides: u32, closed: bool, part_count: u16) -> Mesh {
     let signature = signature(strips, sides, closed, part_count);
-    let topology = cached(&signature, || topology(strips, sides, closed, part_count));
+    let Shared { topology, circle } = cached(signature, || Shared {
+        topology: Arc::new(topology(strips, sides, closed, part_count)),
+        circle: circle(sides),
+    });
     let n = sides as usize;
-    let circle: Vec<(f64, f64)> = (0..n)
-        .map(|k| {
-            let angle = core::f64::consts::TAU * k as f64 / n as f64;
-            (libm::cos(angle), libm::sin(angle))
-        })
-        .collect();
     let count: usize = strips.iter().map(|s| s.points.len() * n).sum();
     let (mut positions, mut normals) = (Vec::with_capacity(count), Vec::with_capacity(count));
     for s in strips {
@@ -55,7 +55,7 @@ pub(super) fn revolve(strips: &[Strip], sides: u32, closed: bool, part_count: u1
                 normals.push(Vec3::new(0.0, if ny < 0.0 { -1.0 } else { 1.0 }, 0.0));
                 continue;
             }
-            for (c, s) in &circle {
+            for (c, s) in circle.iter() {
                 positions.push(Vec3::new((r * c) as f32, *y as f32, (r * s) as f32));
                 normals.push(Vec3::new((nr * c) as f32, ny as f32, (nr * s) as f32));
             }
@@ -64,32 +64,56 @@ pub(super) fn revolve(strips: &[Strip], sides: u32, closed: bool, part_count: u1
     Mesh { positions, normals, topology }
 }
 
+/// Cosine and sine of each meridian's angle from x towards z.
+fn circle(sides: u32) -> Arc<[(f64, f64)]> {
+    let angle = |k: u32| core::f64::consts::TAU * f64::from(k) / f64::from(sides);
+    (0..sides).map(|k| (libm::cos(angle(k)), libm::sin(angle(k)))).collect()
+}
+
 fn signature(strips: &[Strip], sides: u32, closed: bool, part_count: u16) -> Signature {
-    let mut numbers = Vec::new();
+    let mut numbers = Vec::with_capacity(strips.iter().map(|s| s.parts.len() + 2).sum());
     for s in strips {
         let pole = |p: Option<&(f64, f64)>| u32::from(p.is_some_and(|p| p.0 == 0.0));
-        numbers.extend([s.points.len() as u32, pole(s.points.first()), pole(s.points.last())]);
+        let flags = pole(s.points.first()) | pole(s.points.last()) << 1 | u32::from(s.blend) << 2;
+        numbers.extend([s.points.len() as u32, flags]);
         numbers.extend(s.parts.iter().map(|p| u32::from(*p)));
     }
     Signature { sides, closed, part_count, strips: numbers }
 }
 
-/// The topologies used last: results do not depend on what is in here.
-const KEPT: usize = 16;
-thread_local! {
-    static CACHE: RefCell<Vec<(Signature, Arc<Topology>)>> = const { RefCell::new(Vec::new()) };
+/// What surfaces of one signature have in common.
+#[derive(Clone)]
+struct Shared {
+    topology: Arc<Topology>,
+    circle: Arc<[(f64, f64)]>,
 }
 
-fn cached(signature: &Signature, make: impl FnOnce() -> Topology) -> Arc<Topology> {
-    CACHE.with_borrow_mut(|cache| {
-        if let Some(i) = cache.iter().position(|(s, _)| s == signature) {
-            return Arc::clone(&cache[i].1);
+/// The number of topologies kept, those used last.
+const KEPT: usize = 16;
+/// Larger ones, in triangles, are not kept.
+const KEPT_TRIANGLES: usize = 200_000;
+thread_local! {
+    static CACHE: RefCell<Vec<(Signature, Shared)>> = const { RefCell::new(Vec::new()) };
+}
+
+/// What was made for this signature before on this thread, or is made now.
+fn cached(signature: Signature, make: impl FnOnce() -> Shared) -> Shared {
+    let found = CACHE.with_borrow_mut(|cache| {
+        let i = cache.iter().position(|(s, _)| *s == signature)?;
+        // The one used last stands last.
+        cache[i..].rotate_left(1);
+        cache.last().map(|(_, shared)| shared.clone())
+    });
+    found.unwrap_or_else(|| {
+        let made = make();
+        if made.topology.triangles.len() <= KEPT_TRIANGLES {
+            CACHE.with_borrow_mut(|cache| {
+                if cache.len() == KEPT {
+                    cache.remove(0);
+                }
+                cache.push((signature, made.clone()));
+            });
         }
-        let made = Arc::new(make());
-        if cache.len() == KEPT {
-            cache.remove(0);
-        }
-        cache.push((signature.clone(), Arc::clone(&made)));
         made
     })
 }
@@ -141,14 +165,17 @@ fn topology(strips: &[Strip], sides: u32, closed: bool, part_count: u16) -> Topo
         end = rings.last().map(|(first, count)| (*first..first + count).map(|v| weld[v as usize]).collect());
     }
     if closed && let Some(end) = end {
-        // The last ring is the first one: its points take their names, wherever they are used.
-        for (k, w) in end.iter().enumerate() {
-            let first = k as u32;
-            weld.iter_mut().filter(|x| **x == *w).for_each(|x| *x = first);
-        }
+        // The last ring is the first one: its points, numbered one after another, take their names wherever used.
+        let from = end.first().copied().unwrap_or(0);
+        let names = from..from + end.len() as u32;
+        weld.iter_mut().filter(|w| names.contains(w)).for_each(|w| *w -= from);
     }
     let welded: Vec<[u32; 3]> = triangles.iter().map(|t| t.map(|v| weld[v as usize])).collect();
-    let edges = pair_edges(&welded, |a, b| strip_of[a] != strip_of[b])
+    let is_crease = |a: usize, b: usize| {
+        let (before, after) = (strip_of[a].min(strip_of[b]), strip_of[a].max(strip_of[b]));
+        before != after && !(after == before + 1 && strips[after].blend)
+    };
+    let edges = pair_edges(&welded, is_crease)
         .into_iter()
         .map(|(f, c, g, crease)| Edge {
             vertices: [triangles[f][c], triangles[f][(c + 1) % 3]],

@@ -1,7 +1,11 @@
 //! Solids: meshes placed in the world, alone or in groups. Cheap to clone and to move: meshes are shared.
+//!
+//! Not a volume: members may overlap, nothing is cut or merged. Invariant: a member's parts are numbered after those of the
+//! members before it (numbers beyond 65534 are all drawn as that one).
 
-use super::{Affine, Bounds, GeomError, Mesh};
-use glam::{DVec3, Vec3};
+use super::mesh::{MOST_PARTS, MOST_TRIANGLES};
+use super::{Affine, Bounds, Edge, GeomError, Mesh, NO_FACE, Topology};
+use glam::DVec3;
 use std::sync::Arc;
 
 /// A placed mesh.
@@ -64,30 +68,58 @@ impl Solid {
     }
 
     /// Moved so that the centre of its box is the origin; with `fit` also scaled so that half the box's longest edge is 1.
+    /// Left as it is where no finite placement does that.
     pub fn centred(&self, fit: bool) -> Solid {
         let Some(b) = self.bounds() else { return self.clone() };
         let half = 0.5 * b.size().max_element();
         let scale = if fit && half > 0.0 { 1.0 / half } else { 1.0 };
-        self.placed(Affine::new(-scale * b.centre(), DVec3::ZERO, DVec3::splat(scale)))
+        let by = Affine::new(-scale * b.centre(), DVec3::ZERO, DVec3::splat(scale));
+        if by.is_finite() { self.placed(by) } else { self.clone() }
     }
 
-    /// One mesh in world coordinates, for export.
+    /// One mesh in world coordinates, for export: the same faces, normals and creases as its members, in order. Where a
+    /// placement squashes faces flat, the mesh is built anew from what is left.
     ///
     /// # Errors
     /// As [`Mesh::new`].
     pub fn to_mesh(&self) -> Result<Mesh, GeomError> {
-        let (mut positions, mut triangles, mut parts) = (Vec::<Vec3>::new(), Vec::new(), Vec::new());
+        let count: usize = self.instances.iter().map(|i| i.mesh.topology.triangles.len()).sum();
+        if count > MOST_TRIANGLES {
+            return Err(GeomError::invalid(format!(
+                "a solid of {count} triangles; at most {MOST_TRIANGLES} in one mesh"
+            )));
+        }
+        let (mut positions, mut normals, mut t) = (Vec::new(), Vec::new(), Topology::default());
         for i in self.instances.iter() {
-            let first = positions.len() as u32;
+            let (first, first_face) = (positions.len() as u32, t.triangles.len() as u32);
+            let turn = i.affine.normal_matrix();
+            // Squashed onto a point along a line, normals have no image; any one will do.
+            let normal = |n: &glam::Vec3| (turn * n.as_dvec3()).normalize_or(DVec3::Y).as_vec3();
             positions.extend(i.mesh.positions.iter().map(|p| i.affine.point(p.as_dvec3()).as_vec3()));
+            normals.extend(i.mesh.normals.iter().map(normal));
             let mirrored = i.affine.is_mirrored();
-            triangles.extend(i.mesh.topology.triangles.iter().map(|t| {
-                let [a, b, c] = t.map(|v| v + first);
+            t.triangles.extend(i.mesh.topology.triangles.iter().map(|face| {
+                let [a, b, c] = face.map(|v| v + first);
                 if mirrored { [a, c, b] } else { [a, b, c] }
             }));
-            parts.extend(i.mesh.topology.parts.iter().map(|p| p.saturating_add(i.first_part)));
+            let last_part = (MOST_PARTS - 1) as u16;
+            t.parts.extend(i.mesh.topology.parts.iter().map(|p| p.saturating_add(i.first_part).min(last_part)));
+            t.edges.extend(i.mesh.topology.edges.iter().map(|e| {
+                let [a, b] = e.vertices.map(|v| v + first);
+                let faces = e.faces.map(|f| if f == NO_FACE { NO_FACE } else { f + first_face });
+                Edge { vertices: if mirrored { [b, a] } else { [a, b] }, faces, crease: e.crease }
+            }));
         }
-        Mesh::new(positions, triangles, parts)
+        t.part_count = self.part_count();
+        let whole = |face: &[u32; 3]| {
+            let p = face.map(|v| positions[v as usize].as_dvec3());
+            (p[1] - p[0]).cross(p[2] - p[0]).length_squared() > 0.0
+        };
+        // Also false where a coordinate is not finite, which `Mesh::new` then names.
+        if t.triangles.is_empty() || !t.triangles.iter().all(whole) || !positions.iter().all(|p| p.is_finite()) {
+            return Mesh::new(positions, t.triangles, t.parts);
+        }
+        Ok(Mesh { positions, normals, topology: Arc::new(t) })
     }
 }
 
@@ -111,5 +143,65 @@ mod tests {
         let m = g.to_mesh().unwrap();
         assert_eq!(m.topology.triangles.len(), 12 + b.instances()[0].mesh.topology.triangles.len());
         assert_eq!(m.topology.part_count, 2);
+    }
+
+    fn block(size: DVec3) -> Solid {
+        Solid::new(Arc::new(cuboid(size).unwrap()))
+    }
+
+    #[test]
+    fn centring_without_fit_keeps_sizes_and_survives_extremes() {
+        let shift = Affine::new(DVec3::new(3.0, -5.0, 0.25), DVec3::new(0.3, 0.0, 0.0), DVec3::ONE);
+        let s = block(DVec3::new(1.0, 4.0, 2.0)).placed(shift);
+        let (before, after) = (s.bounds().unwrap(), s.centred(false).bounds().unwrap());
+        assert!(after.centre().length() < 1e-12 && (after.size() - before.size()).length() < 1e-12);
+        assert!(Solid::group(&[]).centred(true).bounds().is_none());
+        for scale in [0.0, 1e-320, 1e308] {
+            let extreme = block(DVec3::ONE).placed(Affine::new(DVec3::ZERO, DVec3::ZERO, DVec3::splat(scale)));
+            assert!(extreme.centred(true).instances().iter().all(|i| i.affine.is_finite()), "{scale}");
+        }
+    }
+
+    #[test]
+    fn parts_of_nested_groups_follow_one_another() {
+        let b = block(DVec3::ONE);
+        let inner = Solid::group(&[b.clone(), b.clone()]);
+        let outer = Solid::group(&[b.clone(), inner.clone(), inner]);
+        assert_eq!(outer.instances().iter().map(|i| i.first_part).collect::<Vec<_>>(), [0, 1, 2, 3, 4]);
+        let far = (0..17).fold(b, |s, _| Solid::group(&[s.clone(), s]));
+        assert_eq!(far.part_count(), u16::MAX, "numbers end there");
+        let m = far.to_mesh().unwrap();
+        assert_eq!((m.topology.triangles.len(), m.topology.parts.iter().max()), (12 << 17, Some(&65534)));
+    }
+
+    #[test]
+    fn export_keeps_normals_and_creases_and_turns_mirrored_faces() {
+        // A coarse sphere is smooth although its faces meet at 90 degrees.
+        let s = Solid::new(Arc::new(sphere(1.0, 4).unwrap()));
+        let scale = DVec3::new(-1.0, 2.0, 1.0);
+        let m = s.placed(Affine::new(DVec3::ZERO, DVec3::ZERO, scale)).to_mesh().unwrap();
+        assert!(m.topology.edges.iter().all(|e| !e.crease && e.faces[1] != NO_FACE));
+        for (p, n) in m.positions.iter().zip(&m.normals) {
+            // The gradient of x^2 + (y/2)^2 + z^2.
+            let expected = (p.as_dvec3() / (scale * scale)).normalize();
+            assert!((n.as_dvec3() - expected).length() < 1e-6);
+        }
+        let t = &m.topology;
+        for face in &t.triangles {
+            let p = face.map(|v| m.positions[v as usize]);
+            assert!((p[1] - p[0]).cross(p[2] - p[0]).dot(p[0] + p[1] + p[2]) > 0.0, "outward");
+        }
+        for e in &t.edges {
+            let face = t.triangles[e.faces[0] as usize];
+            assert!((0..3).any(|c| e.vertices == [face[c], face[(c + 1) % 3]]), "as the first face runs");
+        }
+    }
+
+    #[test]
+    fn squashed_and_endless_solids() {
+        let flat = |y: f64| block(DVec3::ONE).placed(Affine::new(DVec3::ZERO, DVec3::ZERO, DVec3::new(1.0, y, 1.0)));
+        assert_eq!(flat(0.0).to_mesh().unwrap().topology.triangles.len(), 4, "the sides are gone");
+        assert!(flat(1e300).to_mesh().unwrap_err().to_string().contains("not finite"));
+        assert!(Solid::group(&[]).to_mesh().is_err());
     }
 }

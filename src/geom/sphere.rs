@@ -1,15 +1,16 @@
-//! Spheres.
+//! Spheres, as meridians and rings; not subdivided solids. Invariant: every normal is the exact one of the sphere.
 
+use super::lathe::SMALLEST;
 use super::revolve::{Strip, revolve};
 use super::{GeomError, Mesh};
 
 /// A sphere round the origin with `sides` meridians and half as many rings.
 ///
 /// # Errors
-/// Unless the radius is positive and finite, and there are 4 to 1024 sides.
+/// Unless the radius is from 1e-30 to 1e6, and there are 4 to 1024 sides.
 pub fn sphere(radius: f64, sides: u32) -> Result<Mesh, GeomError> {
-    if !(radius > 0.0 && radius < 1e6) {
-        return Err(GeomError::domain(format!("sphere: the radius must be positive, got {radius}")));
+    if !(SMALLEST..=1e6).contains(&radius) {
+        return Err(GeomError::domain(format!("sphere: the radius must be from 1e-30 to 1e6, got {radius}")));
     }
     if !(4..=1024).contains(&sides) {
         return Err(GeomError::domain(format!("sphere: 4 to 1024 sides, got {sides}")));
@@ -20,8 +21,12 @@ pub fn sphere(radius: f64, sides: u32) -> Result<Mesh, GeomError> {
         let r = if i == 0 || i == rings { 0.0 } else { radius * libm::cos(angle) };
         (r, radius * libm::sin(angle))
     });
-    let strip = Strip { points: points.collect(), parts: vec![0; rings as usize] };
-    Ok(revolve(&[strip], sides, false, 1))
+    let strip = Strip { points: points.collect(), parts: vec![0; rings as usize], blend: false };
+    let mut mesh = revolve(&[strip], sides, false, 1);
+    for (n, p) in mesh.normals.iter_mut().zip(&mesh.positions) {
+        *n = p.as_dvec3().normalize_or(n.as_dvec3()).as_vec3();
+    }
+    Ok(mesh)
 }
 
 #[cfg(test)]
@@ -33,9 +38,11 @@ mod tests {
         let s = sphere(2.0, 32).unwrap();
         for (p, n) in s.positions.iter().zip(&s.normals) {
             assert!((p.length() - 2.0).abs() < 1e-5);
-            assert!((*p / 2.0 - *n).length() < 1e-5, "{p} {n}");
+            assert!((*p / 2.0 - *n).length() < 2e-7, "{p} {n}");
         }
         assert!(s.topology.edges.iter().all(|e| !e.crease && e.faces[1] != crate::geom::NO_FACE));
+        let poles = s.normals.iter().filter(|n| n.x == 0.0 && n.z == 0.0).map(|n| n.y).collect::<Vec<_>>();
+        assert_eq!(poles, [-1.0, 1.0]);
         assert!(sphere(0.0, 32).is_err() && sphere(f64::NAN, 32).is_err() && sphere(1.0, 3).is_err());
     }
 }

@@ -1,12 +1,13 @@
 //! The first half of an update: marking what may have changed.
 //!
 //! Marking follows users, not values, and stops at choices: an absorbing choice keeps its value whatever its distribution
-//! becomes, so only its density is in question. The second half ([`super::demand`]) re-runs marked nodes on demand and
+//! becomes, so only its density is in question (but for those that may have to be drawn anew). The second half ([`super::demand`]) re-runs marked nodes on demand and
 //! stops where values come out equal.
 
 use super::graph::Graph;
 use super::node::*;
-use crate::lang::code::{Callee, Code, Op, Operand};
+use crate::lang::code::{Callee, Code, DistSpec, Op, Operand};
+use crate::lang::value::Value;
 
 impl Graph {
     /// Marks a choice that is about to change, and everything that reads it.
@@ -97,16 +98,21 @@ impl Graph {
 
     /// Marks one node, if it is evaluated and not yet marked.
     fn mark(&mut self, code: &Code, n: NodeId) {
-        if self.nodes[n as usize].state != State::Clean {
+        let state = self.nodes[n as usize].state;
+        if state != State::Clean {
+            // A choice marked before its key was.
+            if matches!(state, State::Stale)
+                && matches!(self.op(code, n), Op::Draw { keys, .. } if !keys.is_empty())
+                && self.may_be_redrawn(code, n)
+            {
+                self.stack.push(n);
+            }
             return;
         }
         self.make_stale(code, n);
         match self.op(code, n) {
             Op::Draw { .. } => {
-                // A whitened choice's value moves with its distribution.
-                if let Some(Side::Choice(c)) = self.nodes[n as usize].side.as_deref()
-                    && c.stored.is_some()
-                {
+                if self.may_be_redrawn(code, n) {
                     self.stack.push(n);
                 }
             }
@@ -117,6 +123,21 @@ impl Graph {
             }
             _ => self.stack.push(n),
         }
+    }
+
+    /// Whether a marked choice may get another value without being a target: a whitened one moves with its distribution; one
+    /// whose key, length or kind changes is drawn anew.
+    fn may_be_redrawn(&self, code: &Code, n: NodeId) -> bool {
+        let node = &self.nodes[n as usize];
+        let Op::Draw { dist, keys, .. } = self.op(code, n) else { return false };
+        let stale = |o: &Operand| {
+            self.resolve(node.frame, *o).is_some_and(|k| matches!(self.nodes[k as usize].state, State::Stale))
+        };
+        let whole = matches!(node.side.as_deref(), Some(Side::Choice(c)) if c.stored.is_some() || c.elements != NONE);
+        whole
+            || matches!(dist, DistSpec::Value(_))
+            || !matches!(node.value, Value::Num(_) | Value::Bool(_))
+            || keys.iter().any(stale)
     }
 
     /// Marks the elements of a loop's passes: what it runs over may have changed.

@@ -65,7 +65,11 @@ impl Folder {
     /// Runs the command here; one that takes over two minutes fails.
     pub fn run(&self, args: &[&str]) -> Done {
         let mut c = Command::cargo_bin("pcadlang").unwrap();
-        c.current_dir(&self.0).env("NO_COLOR", "1").env_remove("RUST_BACKTRACE").timeout(Duration::from_secs(120));
+        c.current_dir(&self.0)
+            .env("NO_COLOR", "1")
+            .env_remove("RUST_BACKTRACE")
+            .env_remove("COLUMNS")
+            .timeout(Duration::from_secs(120));
         let o = c.args(args).output().unwrap();
         let text = |b: &[u8]| String::from_utf8_lossy(b).into_owned();
         let (out, err) = (text(&o.stdout), text(&o.stderr));

@@ -29,7 +29,7 @@ use super::value::Value;
 use crate::diag::{Diagnostic, SourceMap};
 use crate::syntax::ast::{Expr, FnDecl, KStmt, KernelDecl, Name};
 use crate::syntax::span::{Span, Spanned};
-use indexmap::IndexMap;
+use indexmap::{IndexMap, IndexSet};
 use rustc_hash::FxHashMap;
 use scope::{Body, Module, Scope};
 use std::sync::Arc;
@@ -117,7 +117,7 @@ pub fn compile(loaded: &Loaded, inputs: Inputs, map: &mut SourceMap) -> Result<C
         exports: Vec::new(),
         used_sets: Vec::new(),
         used_data: Vec::new(),
-        roots: Vec::new(),
+        roots: IndexSet::new(),
     };
     l.code.blocks.push(Block::new(BlockKind::Root, None));
     l.scopes.push(Scope::new(0, scope::ScopeKind::Root));
@@ -169,7 +169,7 @@ struct Lowerer<'a> {
     used_sets: Vec<String>,
     used_data: Vec<String>,
     /// First segments of addresses: what a selection may begin with.
-    roots: Vec<Arc<str>>,
+    roots: IndexSet<Arc<str>>,
 }
 
 /// An operand and what is known of its type.

@@ -162,8 +162,8 @@ impl Lowerer<'_> {
 
     /// Remembers a name that addresses may begin with.
     fn note_root(&mut self, name: &Arc<str>) {
-        if self.bodies.len() == 1 && self.body().prefix.is_empty() && !self.roots.contains(name) {
-            self.roots.push(Arc::clone(name));
+        if self.bodies.len() == 1 && self.body().prefix.is_empty() {
+            self.roots.insert(Arc::clone(name));
         }
     }
 
@@ -173,9 +173,7 @@ impl Lowerer<'_> {
         if self.bodies.len() == 1
             && let Some(m) = &module
         {
-            if !self.roots.contains(m) {
-                self.roots.push(Arc::clone(m));
-            }
+            self.roots.insert(Arc::clone(m));
         } else {
             self.note_root(name);
         }

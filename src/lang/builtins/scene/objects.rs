@@ -53,7 +53,12 @@ impl Object for AffineValue {
     }
 
     fn field(&self, name: &str) -> Option<Value> {
-        (name == "translate").then(|| xyz(self.0.0.translation.to_array()))
+        match name {
+            "translate" => Some(xyz(self.0.0.translation.to_array())),
+            // Where the object's own y axis points.
+            "axis" => Some(xyz(self.0.0.matrix3.y_axis.normalize_or_zero().to_array())),
+            _ => None,
+        }
     }
 }
 

@@ -77,11 +77,14 @@ impl ImageValue {
     }
 }
 
-/// The points that count as edges: weaker ones are more often texture than outline.
+/// Points weaker than this are more often texture than outline: the detector's own best threshold against human
+/// outlines is 0.47, and a few more edges help where the object is dim (docs/objects.md).
+const STRONG: f32 = 0.4;
+
+/// The points that count as edges.
 fn strong(map: ContourMap) -> ContourMap {
-    let least: f32 = std::env::var("STRONG").ok().and_then(|s| s.parse().ok()).unwrap_or(0.35);
     let mut kept = ContourMap::new(map.width, map.height);
-    for i in (0..map.len()).filter(|i| map.strength[*i] >= least) {
+    for i in (0..map.len()).filter(|i| map.strength[*i] >= STRONG) {
         kept.x.push(map.x[i]);
         kept.y.push(map.y[i]);
         kept.tx.push(map.tx[i]);

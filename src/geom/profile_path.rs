@@ -1,0 +1,174 @@
+//! From profiles to the strips of a vessel's outer and inner wall.
+//!
+//! Works in the half plane (r, y), knows nothing of triangles. Invariant: neighbouring points differ by more than the
+//! tolerance, so that no triangle collapses in single precision, and each strip begins where the one before ends.
+
+use super::lathe::{Profile, SMALLEST};
+use super::revolve::Strip;
+
+/// Profiles that meet within this angle go on smoothly: the cosine of 40 degrees.
+const SMOOTH_COS: f64 = 0.766_044_443_118_978;
+/// An end at the axis is a smooth dome if its slope there is at most this (the surface then turns by less than 40 degrees
+/// across the axis), else a tip: the tangent of 20 degrees.
+const DOME_SLOPE: f64 = 0.363_970_234_266_202;
+/// Radii below this share of the size count as at the axis and are drawn as if they were it.
+const TIP: f64 = 1e-6;
+/// An inner wall keeps at least this share of the outer radius.
+const LEAST_BORE: f64 = 0.02;
+
+/// How near points may come, from the size of an object.
+#[derive(Clone, Copy, Debug)]
+pub(super) struct Tolerance {
+    tip: f64,
+    r: f64,
+    y: f64,
+}
+
+impl Tolerance {
+    /// For checked profiles; `None` if they have no extent.
+    pub fn of(parts: &[Profile]) -> Option<Tolerance> {
+        let widest = parts.iter().flat_map(|p| &p.r).fold(0.0, |a: f64, r| a.max(*r));
+        let (bottom, top) = (*parts.first()?.y.first()?, *parts.last()?.y.last()?);
+        let size = widest.max(top - bottom);
+        // Heights may lie far from 0, where single precision is coarser.
+        let y = 1e-6 * size + 2.0 * f64::from(f32::EPSILON) * bottom.abs().max(top.abs());
+        (size > SMALLEST).then_some(Tolerance { tip: TIP * size, r: 1e-6 * size, y })
+    }
+
+    /// Whether a radius, not below the least one, is at the axis.
+    pub fn is_tip(&self, r: f64) -> bool {
+        r <= self.tip
+    }
+
+    fn near(&self, a: (f64, f64), b: (f64, f64)) -> bool {
+        (a.0 - b.0).abs() <= self.r && (a.1 - b.1).abs() <= self.y
+    }
+}
+
+/// The outer wall.
+pub(super) struct OuterPath {
+    /// Its lowest point.
+    pub first: (f64, f64),
+    /// Its highest.
+    pub last: (f64, f64),
+    /// Its strips, rings at steps included; none if it is a single circle.
+    pub strips: Vec<Strip>,
+}
+
+impl OuterPath {
+    /// Stacks checked profiles; steps get the part number `ring`.
+    pub fn new(parts: &[Profile], tolerance: &Tolerance, ring: u16) -> OuterPath {
+        let mut points: Vec<(f64, f64)> = Vec::new();
+        let mut labels: Vec<u16> = Vec::new();
+        for (i, p) in parts.iter().enumerate() {
+            for (k, (r, y)) in p.r.iter().zip(&p.y).enumerate() {
+                let q = (r.max(tolerance.tip), *y);
+                match points.last() {
+                    Some(end) if tolerance.near(*end, q) => {}
+                    Some(_) => {
+                        points.push(q);
+                        labels.push(if k == 0 { ring } else { i as u16 });
+                    }
+                    None => points.push(q),
+                }
+            }
+        }
+        let is_cut = |k: usize| {
+            let at_ring = labels[k] == ring || labels[k - 1] == ring;
+            at_ring || labels[k] != labels[k - 1] && !is_smooth(points[k - 1], points[k], points[k + 1])
+        };
+        let mut strips = Vec::new();
+        let mut start = 0;
+        for k in 1..=labels.len() {
+            if k == labels.len() || is_cut(k) {
+                let piece =
+                    Strip { points: points[start..=k].to_vec(), parts: labels[start..k].to_vec(), blend: false };
+                strips.push(piece);
+                start = k;
+            }
+        }
+        OuterPath { first: points[0], last: points[points.len() - 1], strips }
+    }
+}
+
+/// Whether the path a, b, c turns by less than a crease does.
+fn is_smooth(a: (f64, f64), b: (f64, f64), c: (f64, f64)) -> bool {
+    let (u, v) = ((b.0 - a.0, b.1 - a.1), (c.0 - b.0, c.1 - b.1));
+    let dot = u.0 * v.0 + u.1 * v.1;
+    dot >= SMOOTH_COS * libm::hypot(u.0, u.1) * libm::hypot(v.0, v.1)
+}
+
+/// Whether a path that ends at the axis arrives there nearly at a right angle.
+fn is_dome(tip: (f64, f64), next: (f64, f64)) -> bool {
+    (next.1 - tip.1).abs() <= DOME_SLOPE * (next.0 - tip.0).abs()
+}
+
+impl Strip {
+    /// Closes the lower end, which is at the axis: a dome by a pole; a tip, which has no normal of its own, by a disc that
+    /// is returned and goes before the strip.
+    pub fn close_start(&mut self) -> Option<Strip> {
+        let tip = self.points[0];
+        if is_dome(tip, self.points[1]) {
+            self.points[0].0 = 0.0;
+            return None;
+        }
+        self.blend = true;
+        Some(Strip { points: vec![(0.0, tip.1), tip], parts: vec![self.parts[0]], blend: false })
+    }
+
+    /// Closes the upper end likewise; the disc goes after the strip.
+    pub fn close_end(&mut self) -> Option<Strip> {
+        let k = self.points.len() - 1;
+        let tip = self.points[k];
+        if is_dome(tip, self.points[k - 1]) {
+            self.points[k].0 = 0.0;
+            return None;
+        }
+        Some(Strip { points: vec![tip, (0.0, tip.1)], parts: vec![self.parts[k - 1]], blend: true })
+    }
+}
+
+/// The height of the floor inside.
+pub(super) fn floor_height(bottom: f64, top: f64, thickness: f64) -> f64 {
+    bottom + thickness.min(0.5 * (top - bottom))
+}
+
+/// The inner wall from the rim, inside `last`, down to a height: its strips, its first and its last point. It has creases
+/// where the outer wall has them.
+pub(super) fn inner_wall(
+    outer: &[Strip],
+    last: (f64, f64),
+    thickness: f64,
+    down_to: f64,
+    tolerance: &Tolerance,
+    part: u16,
+) -> (Vec<Strip>, (f64, f64), (f64, f64)) {
+    let bore = |r: f64| (r - thickness).max(LEAST_BORE * r);
+    let start = (bore(last.0), last.1);
+    let (mut at, mut above) = (start, last);
+    let mut walls = Vec::new();
+    for s in outer.iter().rev() {
+        let mut points = vec![at];
+        for (r, y) in s.points.iter().rev().skip(1) {
+            if above.1 <= down_to {
+                break;
+            }
+            let q = if *y < down_to {
+                // The last piece ends at the floor.
+                let t = (down_to - y) / (above.1 - y);
+                (bore(r + t * (above.0 - r)), down_to)
+            } else {
+                (bore(*r), *y)
+            };
+            above = (*r, *y);
+            if !tolerance.near(at, q) {
+                points.push(q);
+                at = q;
+            }
+        }
+        if points.len() > 1 {
+            walls.push(Strip { parts: vec![part; points.len() - 1], points, blend: false });
+        }
+    }
+    (walls, start, at)
+}
