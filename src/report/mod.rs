@@ -5,13 +5,11 @@
 
 pub mod csv;
 mod draws;
-mod encode;
 mod hash;
 pub mod html;
 pub mod npy;
 mod number;
 pub mod pictures;
-mod plots;
 mod rundir;
 mod sinks;
 pub mod table;
