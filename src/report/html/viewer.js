@@ -65,8 +65,8 @@
     void main() {
       vec3 u = length(n) > 0.0 ? normalize(n) : vec3(0.0, 0.0, 1.0);
       if (u.z < 0.0) u = -u;
-      float light = 0.6 * max(dot(u, vec3(-0.5, 0.62, 0.6)), 0.0) + 0.3 * u.z + 0.1;
-      gl_FragColor = vec4(mix(vec3(0.20, 0.24, 0.32), vec3(0.81, 0.93, 1.0), light), 1.0);
+      float light = 0.72 * max(dot(u, vec3(-0.45, 0.55, 0.7)), 0.0) + 0.22 * u.z + 0.06;
+      gl_FragColor = vec4(mix(vec3(0.12, 0.16, 0.26), vec3(0.81, 0.91, 1.0), light), 1.0);
     }`);
   gl.linkProgram(program);
   gl.useProgram(program);

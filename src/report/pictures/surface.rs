@@ -24,21 +24,20 @@ pub struct Drawn<'a> {
 const OVER: f32 = 0.55;
 /// The colour of contours: far from the surface's blues and from most photographs.
 const STROKE: [f32; 3] = [255.0, 60.0, 20.0];
-/// The colour of what is hidden in the dark between parts, and in full light, per channel. Parts take turns.
-const PALETTE: [[[f32; 3]; 2]; 6] = [
-    [[52.0, 62.0, 82.0], [206.0, 238.0, 255.0]],
-    [[84.0, 62.0, 46.0], [255.0, 228.0, 190.0]],
-    [[48.0, 72.0, 56.0], [206.0, 250.0, 214.0]],
-    [[74.0, 52.0, 78.0], [246.0, 214.0, 255.0]],
-    [[82.0, 76.0, 42.0], [255.0, 248.0, 188.0]],
-    [[44.0, 74.0, 78.0], [198.0, 248.0, 250.0]],
+/// The colours of a part in the dark and in full light. Parts take turns; they differ a little in hue only, for a cap and
+/// the side below it are parts too.
+const PALETTE: [[[f32; 3]; 2]; 4] = [
+    [[30.0, 42.0, 66.0], [206.0, 232.0, 255.0]],
+    [[24.0, 52.0, 62.0], [200.0, 244.0, 246.0]],
+    [[42.0, 40.0, 72.0], [220.0, 222.0, 255.0]],
+    [[38.0, 46.0, 54.0], [224.0, 232.0, 238.0]],
 ];
 
 /// How light a pixel is, from 0 to 1: a light at the camera's upper left, a weaker one at the camera, and some from
 /// everywhere (Lambert's law).
 fn light([x, y, z]: [f32; 3]) -> f32 {
-    let key = (0.6 * z - 0.5 * x + 0.62 * y).max(0.0);
-    let light = 0.6 * key + 0.3 * z.max(0.0) + 0.1;
+    let key = (0.7 * z - 0.45 * x + 0.55 * y).max(0.0);
+    let light = 0.72 * key + 0.22 * z.max(0.0) + 0.06;
     if light.is_finite() { light.clamp(0.0, 1.0) } else { 0.0 }
 }
 
@@ -53,6 +52,12 @@ fn shade(d: &Drawn, i: usize) -> Option<[f32; 3]> {
     Some([0, 1, 2].map(|c| dark[c] + (bright[c] - dark[c]) * light))
 }
 
+/// The same brightness with twice the colour, so that a surface is told from what is seen through it.
+fn vivid(c: [f32; 3]) -> [f32; 3] {
+    let mean = (c[0] + c[1] + c[2]) / 3.0;
+    c.map(|x| (mean + 2.0 * (x - mean)).clamp(0.0, 255.0))
+}
+
 /// The surface drawn over the photograph, half transparent, with its contours on top. The drawing's size decides, but a
 /// small picture is enlarged to [`LONGER_SIDE`] so that it can be judged.
 pub fn overlay(photo: Option<&RgbImage>, drawn: &Drawn, strokes: &Strokes) -> RgbImage {
@@ -63,7 +68,7 @@ pub fn overlay(photo: Option<&RgbImage>, drawn: &Drawn, strokes: &Strokes) -> Rg
     };
     for (i, p) in out.pixels_mut().enumerate() {
         if let Some(s) = shade(drawn, i) {
-            p.0 = mix(p.0, s, OVER);
+            p.0 = mix(p.0, vivid(s), OVER);
         }
     }
     let size = super::picture_size(drawn.width, drawn.height);
@@ -119,9 +124,9 @@ mod tests {
         for ground in [[0, 0, 0], [200, 10, 90]] {
             let o = overlay(Some(&RgbImage::from_pixel(768, 2, Rgb(ground))), &drawn, &none());
             assert_eq!(o.get_pixel(0, 0).0, ground);
-            let full = shaded(&drawn).get_pixel(1, 0).0;
+            let full = vivid(shaded(&drawn).get_pixel(1, 0).0.map(f32::from));
             for c in 0..3 {
-                let expected = 0.45 * f32::from(ground[c]) + 0.55 * f32::from(full[c]);
+                let expected = 0.45 * f32::from(ground[c]) + 0.55 * full[c];
                 assert!((f32::from(o.get_pixel(1, 0).0[c]) - expected).abs() < 1.5, "{o:?}");
             }
         }
