@@ -1,4 +1,6 @@
 //! glTF 2.0 in one binary file (Khronos, glTF 2.0 specification, section 4.4): positions, normals, triangles.
+//!
+//! One mesh, one node, no materials and no parts. Invariant: both chunks are whole and aligned to four bytes.
 
 use super::Mesh;
 use serde_json::json;
@@ -72,5 +74,28 @@ mod tests {
         assert_eq!(document["accessors"][0]["min"], json!([-0.5, -0.5, -0.5]));
         assert_eq!(document["accessors"][2]["count"], 36);
         assert_eq!(&glb[24 + json_length..28 + json_length], b"BIN\0");
+    }
+
+    #[test]
+    fn the_numbers_are_the_mesh_s() {
+        let m = crate::geom::sphere(0.7, 6).unwrap();
+        let glb = write(&m);
+        let start = 28 + u32::from_le_bytes([glb[12], glb[13], glb[14], glb[15]]) as usize;
+        let words: Vec<[u8; 4]> = glb[start..].chunks_exact(4).map(|c| [c[0], c[1], c[2], c[3]]).collect();
+        let n = m.positions.len();
+        let floats: Vec<f32> = words[..6 * n].iter().map(|w| f32::from_le_bytes(*w)).collect();
+        let flat = |vs: &[glam::Vec3]| vs.iter().flat_map(|v| v.to_array()).collect::<Vec<f32>>();
+        assert_eq!((&floats[..3 * n], &floats[3 * n..]), (&flat(&m.positions)[..], &flat(&m.normals)[..]));
+        let corners: Vec<u32> = words[6 * n..].iter().map(|w| u32::from_le_bytes(*w)).collect();
+        assert_eq!(corners, m.topology.triangles.as_flattened());
+        let document: serde_json::Value = serde_json::from_slice(&glb[20..start - 8]).unwrap();
+        for axis in 0..3 {
+            let most = m.positions.iter().map(|p| p[axis]).fold(f32::MIN, f32::max);
+            assert_eq!(document["accessors"][0]["max"][axis].as_f64().unwrap() as f32, most);
+        }
+        let views = document["bufferViews"].as_array().unwrap();
+        assert!(views.iter().all(|v| v["byteOffset"].as_u64().unwrap() % 4 == 0));
+        let end = views[2]["byteOffset"].as_u64().unwrap() + views[2]["byteLength"].as_u64().unwrap();
+        assert_eq!(document["buffers"][0]["byteLength"].as_u64(), Some(end));
     }
 }

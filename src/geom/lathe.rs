@@ -117,7 +117,7 @@ fn check(parts: &[Profile], sides: u32, thickness: f64) -> Result<(), GeomError>
     if !(3..=1024).contains(&sides) {
         return wrong(format!("3 to 1024 sides, got {sides}"));
     }
-    if !(thickness >= 0.0 && thickness <= LARGEST) {
+    if !(0.0..=LARGEST).contains(&thickness) {
         return wrong(format!("the thickness must be from 0 to {LARGEST}, got {thickness}"));
     }
     let walls = if thickness > 0.0 { 2 } else { 1 };

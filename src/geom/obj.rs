@@ -245,6 +245,12 @@ mod tests {
     }
 
     proptest::proptest! {
+        #![proptest_config(proptest::test_runner::Config {
+            rng_seed: proptest::test_runner::RngSeed::Fixed(12),
+            failure_persistence: None,
+            ..Default::default()
+        })]
+
         #[test]
         fn no_text_makes_it_panic(text in "([vf] ?(-?[0-9]{1,3}(/[0-9]{0,2})?|nan|inf|#| |\n){0,6}\n){0,8}") {
             let _ = load(text.as_bytes());

@@ -7,7 +7,8 @@ use crate::syntax::ast::KStmt;
 use rayon::prelude::*;
 use std::sync::Arc;
 
-/// Runs chains `0 .. chains` of a plan; `sinks` has one sink a chain. All chains run to their end even if one fails.
+/// Runs chains `0 .. chains` of a plan; `sinks` has one sink a chain. All chains run to their end even if one fails. A limit
+/// of time is for all of them together: with more chains than threads each gets its share.
 pub fn run_chains(
     code: &Arc<Code>,
     plan: &[KStmt],
