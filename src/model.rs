@@ -51,7 +51,7 @@ impl IntoDiagnostic for RunError {
     fn into_diagnostic(self) -> Diagnostic {
         let mut d = Diagnostic::error(self.message, self.span, "");
         if !self.address.segments.is_empty() {
-            d = d.note(format!("while running {}", self.address));
+            d = d.note(format!("while running {}", self.address.shortened()));
         }
         let calls: Vec<&str> = self.calls.iter().map(|(f, _)| &**f).collect();
         match calls.len() {
@@ -329,8 +329,18 @@ impl Model {
         let plain = |message: String| Diagnostic::new(Severity::Error, message);
         let d = match e {
             ChainError::Run(e) | ChainError::Start(StartError::Run(e)) => e.into_diagnostic(),
-            ChainError::Start(StartError::Impossible(why)) => {
-                plain(format!("no chain can start: {why}")).hint("widen the prior, or the spread of the observation")
+            ChainError::Start(StartError::Impossible(zero)) => {
+                let mut d = plain(format!("no chain can start: {zero}"));
+                for (i, term) in zero.terms.iter().take(5).enumerate() {
+                    d = match i {
+                        0 => d.primary(term.span, format!("the log density of {} is -inf", term.address)),
+                        _ => d.secondary(term.span, format!("so is that of {}", term.address)),
+                    };
+                }
+                if zero.terms.len() > 5 {
+                    d = d.note(format!("and {} more", zero.terms.len() - 5));
+                }
+                d.hint("widen the prior, or the spread of the observation")
             }
             ChainError::Sink(e) => plain(format!("draws cannot be written: {e}")),
         };

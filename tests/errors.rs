@@ -2,25 +2,64 @@
 //!
 //! A new file becomes a test by itself. `INSTA_UPDATE=always cargo test --test errors` accepts the messages as they are:
 //! read them first as someone would who wrote that program.
+//!
+//! `parse` is what the grammar refuses, `name` and `type` what compiling refuses, `runtime` what a short run of one chain
+//! meets. Programs in folders below these are there to be included.
 
 use pcadlang::diag::{Diagnostic, IntoDiagnostic, SourceMap, render};
 use pcadlang::syntax::parse;
-use pcadlang::syntax::span::FileId;
 
-/// What a phase says about a program.
-type Diagnose = fn(&str, FileId) -> Vec<Diagnostic>;
+use pcadlang::{Error, Program, RunOptions};
+use std::path::Path;
 
-/// The message for the program at a path, as shown without colours.
-fn message(path: &std::path::Path, diagnose: Diagnose) -> String {
+/// What a phase says about the program at a path.
+type Diagnose = fn(&Path) -> Error;
+
+/// The path from the crate's root, so that no message depends on where the crate lies.
+fn relative(path: &Path) -> String {
+    let root = Path::new(env!("CARGO_MANIFEST_DIR"));
+    let root = root.canonicalize().unwrap();
+    path.canonicalize().unwrap().strip_prefix(&root).unwrap().to_str().unwrap().replace('\\', "/")
+}
+
+/// The messages of the parser alone.
+fn parsing(path: &Path) -> Error {
     let text = std::fs::read_to_string(path).unwrap();
-    let mut map = SourceMap::new();
-    let id = map.add(&path.file_name().unwrap().to_string_lossy(), &text);
-    let diagnostics = diagnose(&text, id);
+    let mut sources = SourceMap::new();
+    let id = sources.add(&path.file_name().unwrap().to_string_lossy(), &text);
+    let diagnostics: Vec<Diagnostic> = parse(&text, id).1.into_iter().map(IntoDiagnostic::into_diagnostic).collect();
+    Error { diagnostics, sources }
+}
+
+/// What loading and compiling say; data need not be given.
+fn compiling(path: &Path) -> Error {
+    match Program::open(&relative(path)).and_then(|p| p.without_data().compile()) {
+        Ok(_) => panic!("{} is taken for correct", path.display()),
+        Err(e) => e,
+    }
+}
+
+/// What a short run says of a program that compiles.
+fn running(path: &Path) -> Error {
+    let model = match Program::open(&relative(path)).and_then(|p| p.without_data().compile()) {
+        Ok(model) => model,
+        Err(e) => panic!("{} does not compile: {e}", path.display()),
+    };
+    let options = RunOptions { steps: Some(50), warmup: Some(50), ..RunOptions::default() };
+    match model.run(&options, 1, 1) {
+        Ok(_) => panic!("{} is taken for correct", path.display()),
+        Err(e) => e,
+    }
+}
+
+/// The messages for the program at a path, as shown without colours.
+fn message(path: &Path, diagnose: Diagnose) -> String {
+    let Error { diagnostics, sources } = diagnose(path);
     assert!(!diagnostics.is_empty(), "{} is taken for correct", path.display());
     for diagnostic in &diagnostics {
         assert!(diagnostic.labels.iter().any(|l| l.primary), "{}: no place: {}", path.display(), diagnostic.message);
     }
-    render(&map, &diagnostics, false)
+    render(&sources, &diagnostics, false)
 }
 
 /// A test of the programs of one phase.
@@ -40,6 +79,7 @@ macro_rules! phase {
     };
 }
 
-phase!(parse_errors, "parse/*.pcad", |text, file| {
-    parse(text, file).1.into_iter().map(IntoDiagnostic::into_diagnostic).collect()
-});
+phase!(parse_errors, "parse/*.pcad", parsing);
+phase!(name_errors, "name/*.pcad", compiling);
+phase!(type_errors, "type/*.pcad", compiling);
+phase!(runtime_errors, "runtime/*.pcad", running);

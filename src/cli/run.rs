@@ -92,7 +92,7 @@ pub fn run(a: &Run) -> Result<(), Failure> {
         quantities: &quantities,
         kernels: &kernels,
         warnings: &warnings,
-        mesh: drawn.mesh.as_ref().map(|(p, t)| MeshData { positions: p, triangles: t }),
+        mesh: drawn.mesh.as_ref().map(|m| MeshData { positions: &drawn.positions, triangles: &m.topology.triangles }),
         program: model.text(),
     });
     write(&dir, "report.html", html.as_bytes())?;
@@ -171,7 +171,8 @@ fn write_summary(
 #[derive(Default)]
 struct Shown {
     pictures: Vec<(&'static str, Vec<u8>)>,
-    mesh: Option<(Vec<[f32; 3]>, Vec<[u32; 3]>)>,
+    positions: Vec<[f32; 3]>,
+    mesh: Option<Mesh>,
 }
 
 /// Rebuilds the draw with the highest log joint density, saves it, and draws it if it has a view.
@@ -239,8 +240,9 @@ fn draw(
     if let Some(mesh) = mesh(view.solid()) {
         write(dir, "best.obj", obj::write(&mesh).as_bytes())?;
         write(dir, "best.glb", &glb::write(&mesh))?;
-        let positions = mesh.positions.iter().map(|p| p.to_array()).collect();
-        shown.mesh = Some((positions, mesh.topology.triangles.clone()));
+        let positions: Vec<[f32; 3]> = mesh.positions.iter().map(|p| p.to_array()).collect();
+        shown.positions = positions;
+        shown.mesh = Some(mesh);
     }
     Ok(())
 }

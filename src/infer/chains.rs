@@ -17,6 +17,8 @@ pub fn run_chains(
     progress: &Progress,
     sinks: Vec<Box<dyn Sink>>,
 ) -> Vec<Result<ChainResult, ChainError>> {
+    let rounds = sinks.len().div_ceil(threads.max(1)).max(1) as u32;
+    let options = &RunOptions { time: options.time.map(|t| t / rounds), ..options.clone() };
     let run =
         |(chain, mut sink): (usize, Box<dyn Sink>)| run_chain(code, plan, options, progress, &mut *sink, chain as u32);
     let work: Vec<_> = sinks.into_iter().enumerate().collect();

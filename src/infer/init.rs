@@ -1,10 +1,12 @@
 //! Starts: traces of positive probability, and what to say when there is none.
 
+use crate::lang::address::Address;
 use crate::lang::code::Code;
 use crate::lang::error::RunError;
 use crate::rng::{Purpose, StreamKey};
+use crate::syntax::span::Span;
 use crate::trace::{Draws, Limits, Trace};
-use std::fmt::Write;
+use std::fmt;
 use std::sync::Arc;
 
 /// How a chain starts.
@@ -25,7 +27,29 @@ pub enum StartError {
     /// The program fails.
     Run(Box<RunError>),
     /// Every draw tried has probability zero.
-    Impossible(String),
+    Impossible(NoStart),
+}
+
+/// What has no probability in the last draw that was tried.
+#[derive(Debug, Clone, Default)]
+pub struct NoStart {
+    /// Observations and factors first, then choices.
+    pub terms: Vec<ZeroTerm>,
+}
+
+/// A term of the joint density whose logarithm is -∞.
+#[derive(Debug, Clone)]
+pub struct ZeroTerm {
+    /// Its address.
+    pub address: Address,
+    /// Its place in the program.
+    pub span: Span,
+}
+
+impl fmt::Display for NoStart {
+    fn fmt(&self, f: &mut fmt::Formatter<'_>) -> fmt::Result {
+        write!(f, "every one of {RETRIES} draws from the prior has probability zero")
+    }
 }
 
 /// Starts a chain.
@@ -66,28 +90,12 @@ pub fn start(code: &Arc<Code>, seed: u64, chain: u32, how: Start, limits: Limits
         (Some(t), _) => Ok(t),
         (None, Some(Ok(t))) => Err(StartError::Impossible(explain(&t))),
         (None, Some(Err(e))) => Err(StartError::Run(e)),
-        (None, None) => Err(StartError::Impossible("no start was tried".into())),
+        (None, None) => Err(StartError::Impossible(NoStart::default())),
     }
 }
 
 /// Which terms of a trace have no probability.
-fn explain(t: &Trace) -> String {
-    let mut text = format!("every one of {RETRIES} draws from the prior has probability zero");
-    let observed = t.observations();
-    let chosen = t.choices();
-    let zero = observed.iter().map(|(a, s)| (a, *s, "observation or factor"));
-    let zero = zero.chain(chosen.iter().map(|(a, _, s)| (a, *s, "choice")));
-    let mut shown = 0;
-    for (address, score, what) in zero {
-        if score == f64::NEG_INFINITY {
-            if shown < 5 {
-                let _ = write!(text, "\n  {address}: this {what} has log density -inf");
-            }
-            shown += 1;
-        }
-    }
-    if shown > 5 {
-        let _ = write!(text, "\n  and {} more", shown - 5);
-    }
-    text
+fn explain(t: &Trace) -> NoStart {
+    let zero = t.impossible().into_iter().map(|(address, span)| ZeroTerm { address, span });
+    NoStart { terms: zero.collect() }
 }

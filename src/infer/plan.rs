@@ -445,6 +445,12 @@ impl Runner<'_> {
             "anneal" => return self.anneal(e, args),
             _ => {}
         }
+        if self.code.builtins.find("", name).is_none() {
+            let message = format!("kernels that a program declares, such as `{name}`, cannot run yet in this version");
+            let mut e = fail(e.span, message);
+            e.hint = Some("write its statements where it is called".into());
+            return Err(e.into());
+        }
         let Some(sel) = args.first() else {
             return Err(fail(e.span, format!("`{name}` needs a selection of choices, e.g. @**")).into());
         };
@@ -495,7 +501,9 @@ impl Runner<'_> {
                     }
                     _ => {
                         let message = format!("the kernel `{name}` is not available yet in this version");
-                        return Err(fail(e.span, message).into());
+                        let mut e = fail(e.span, message);
+                        e.hint = Some("those that are: mh, block, drift, gibbs, elliptical".into());
+                        return Err(e.into());
                     }
                 };
                 let stats = KernelStats { name: self.label(e), ..Default::default() };

@@ -45,6 +45,18 @@ impl Address {
     }
 }
 
+impl Address {
+    /// The address as text for messages: of a long one the first and last segments.
+    pub fn shortened(&self) -> String {
+        let n = self.segments.len();
+        if n <= 12 {
+            return self.to_string();
+        }
+        let part = |s: &[AddressSegment]| s.iter().map(ToString::to_string).collect::<Vec<_>>().join("/");
+        format!("@{}/… {} more …/{}", part(&self.segments[..4]), n - 7, part(&self.segments[n - 3..]))
+    }
+}
+
 impl fmt::Display for Address {
     fn fmt(&self, f: &mut fmt::Formatter<'_>) -> fmt::Result {
         write!(f, "@")?;

@@ -50,7 +50,7 @@ impl Key {
         match self {
             Key::Num(bits) => {
                 let x = f64::from_bits(*bits);
-                (x >= 0.0 && x < 9e15 && x == libm::trunc(x)).then_some(x as usize)
+                ((0.0..9e15).contains(&x) && x == libm::trunc(x)).then_some(x as usize)
             }
             _ => None,
         }

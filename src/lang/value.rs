@@ -169,6 +169,11 @@ impl Value {
         }
     }
 
+    /// Whether it is an array or record without elements.
+    pub fn is_empty(&self) -> bool {
+        self.len() == Some(0)
+    }
+
     /// Element `i` of an array.
     pub fn element(&self, i: usize) -> Option<Value> {
         match self {

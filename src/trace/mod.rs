@@ -317,6 +317,23 @@ impl Trace {
         self.scored().into_iter().map(|(n, s)| (self.graph.address(&self.code, n), s)).collect()
     }
 
+    /// What has log density -∞, with its place in the program: observations and factors first, then choices.
+    pub fn impossible(&self) -> Vec<(Address, crate::syntax::span::Span)> {
+        let observed = self.scored().into_iter().filter(|(_, s)| *s == f64::NEG_INFINITY).map(|(n, _)| n);
+        let mut found: Vec<_> = observed.map(|n| (self.graph.address(&self.code, n), self.span(n))).collect();
+        let targets = self.graph.choices.selections[0].targets();
+        let zero = targets.iter().filter(|t| self.target_score(**t) == f64::NEG_INFINITY);
+        let mut chosen: Vec<_> = zero.map(|t| (self.address(*t), self.span(t.node))).collect();
+        chosen.sort_by(|a, b| a.0.cmp(&b.0));
+        found.extend(chosen);
+        found
+    }
+
+    fn span(&self, n: u32) -> crate::syntax::span::Span {
+        let frame = &self.graph.frames[self.graph.nodes[n as usize].frame as usize];
+        self.code.blocks[frame.block as usize].spans[(n - frame.base) as usize]
+    }
+
     /// Whether an observation's likelihood is no density over its data, so that its scale is a matter of choice.
     pub fn is_pseudo(&self) -> bool {
         let improper = |n: u32| {

@@ -86,7 +86,10 @@ proptest! {
             match how {
                 0 => text.replace_range(start..end, ""),
                 1 => text.insert_str(start, PIECES[piece]),
-                _ => text.insert_str(start, &text[start..end].to_owned()),
+                _ => {
+                    let twice = text[start..end].to_owned();
+                    text.insert_str(start, &twice);
+                }
             }
         }
         check(&text);

@@ -18,6 +18,9 @@ pub struct Args<'a> {
     pub values: &'a [&'a Value],
 }
 
+/// Numbers, borrowed where they can be.
+type Numbers<'a> = Cow<'a, [f64]>;
+
 impl<'a> Args<'a> {
     /// Argument `i`.
     pub fn get(&self, i: usize) -> &'a Value {
@@ -153,7 +156,7 @@ impl<'a> Args<'a> {
     }
 
     /// Two arrays of numbers of equal length.
-    pub fn number_pair(&self, i: usize, j: usize) -> Result<(Cow<'a, [f64]>, Cow<'a, [f64]>), Fault> {
+    pub fn number_pair(&self, i: usize, j: usize) -> Result<(Numbers<'a>, Numbers<'a>), Fault> {
         let (x, y) = (self.numbers(i)?, self.numbers(j)?);
         if x.len() == y.len() {
             return Ok((x, y));

@@ -107,15 +107,15 @@ fn negate(a: &Args) -> Result<Value, Fault> {
 }
 
 fn not(a: &Args) -> Result<Value, Fault> {
-    fn go(a: &Args, v: &Value) -> Result<Value, Fault> {
+    fn go(v: &Value) -> Result<Value, Fault> {
         match v {
             Value::Bool(b) => Ok(Value::Bool(!b)),
-            Value::List(xs) => xs.iter().map(|x| go(a, x)).collect::<Result<Vec<_>, _>>().map(Value::from_elements),
+            Value::List(xs) => xs.iter().map(go).collect::<Result<Vec<_>, _>>().map(Value::from_elements),
             Value::Array(xs) if xs.is_empty() => Ok(v.clone()),
             _ => Err(Fault::type_error(format!("`not` needs a bool, got {}", v.type_name()))),
         }
     }
-    go(a, a.get(0))
+    go(a.get(0))
 }
 
 fn equality(a: &Args, wanted: bool) -> Result<Value, Fault> {

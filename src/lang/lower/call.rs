@@ -47,7 +47,10 @@ impl Lowerer<'_> {
                 let f = self.expr(callee);
                 if !matches!(f.ty, Type::Any | Type::Function) {
                     let message = format!("only functions can be called, not {}", shown(f.ty));
-                    self.error(message, callee.span, format!("this is {}", shown(f.ty)));
+                    let e = self.error(message, callee.span, format!("this is {}", shown(f.ty)));
+                    if matches!(f.ty, Type::Num | Type::Int | Type::Nums) {
+                        e.hint_also("a product is written with `*`");
+                    }
                     return self.nothing();
                 }
                 let label = self.callee_name(callee);
@@ -138,7 +141,11 @@ impl Lowerer<'_> {
     }
 
     fn written(&mut self, args: &[Arg]) -> Vec<(Option<Arc<str>>, Typed, Span)> {
-        args.iter().map(|a| (a.name.as_ref().map(|n| Arc::clone(&n.node)), self.expr(&a.value), a.value.span)).collect()
+        let one = |l: &mut Self, a: &Arg| {
+            let at = a.name.as_ref().map_or(a.value.span, |n| n.span);
+            (a.name.as_ref().map(|n| Arc::clone(&n.node)), l.expr(&a.value), at)
+        };
+        args.iter().map(|a| one(self, a)).collect()
     }
 
     /// The arguments of a built-in in the table's order.
@@ -147,10 +154,7 @@ impl Lowerer<'_> {
         let order = match b.match_names(args.iter().map(|a| a.name.as_ref().map(|n| &*n.node))) {
             Ok(order) => order,
             Err(message) => {
-                let at =
-                    args.iter().filter_map(|a| a.name.as_ref()).find(|n| !b.args.iter().any(|p| p.name == &*n.node));
-                let at = at.map_or(span, |n| n.span);
-                self.error(message, at, "in this call");
+                self.mismatch(&b, message, args, span);
                 self.written(args);
                 return None;
             }
@@ -166,7 +170,11 @@ impl Lowerer<'_> {
                         let message =
                             format!("{}: `{}` must be {}, got {}", b.full_name(), arg.name, shown(arg.ty), shown(v.ty));
                         let e = self.error(message, args[*j].value.span, format!("this is {}", shown(v.ty)));
-                        e.hint_also(b.signature());
+                        if v.ty == Type::Dist {
+                            e.hint_also("draw from it first: x ~ …; then use x");
+                        } else {
+                            e.hint_also(b.signature());
+                        }
                     }
                     operands.push(v.at);
                 }
@@ -193,7 +201,7 @@ impl Lowerer<'_> {
         let order = match b.match_names(args.iter().map(|a| a.name.as_ref().map(|n| &*n.node))) {
             Ok(order) => order,
             Err(message) => {
-                self.error(message, span, "in this call");
+                self.mismatch(&b, message, args, span);
                 self.written(args);
                 return self.nothing();
             }
@@ -206,7 +214,10 @@ impl Lowerer<'_> {
                 _ => l.callee_name(e),
             };
             let value = l.expr(e);
-            l.check_type(value, Type::Function, e.span, &format!("the function of `{}`", b.name));
+            if !accepts(Type::Function, value.ty) {
+                let message = format!("`{}` takes a function first, got {}", b.name, shown(value.ty));
+                l.error(message, e.span, format!("this is {}", shown(value.ty))).hint_also(b.signature());
+            }
             (value, label)
         };
         let probe = |p: Probe| Op::Probe(p);

@@ -4,6 +4,7 @@ use super::scope::{Meaning, ScopeKind};
 use super::{AddHint, Lowerer, Typed};
 use crate::lang::builtins::Type;
 use crate::lang::code::{DistSpec, Op, Operand, Slot, Source, SourceKey};
+use crate::lang::value::Value;
 use crate::syntax::ast::{Expr, ExprKind, Name, Stmt, StmtKind, Tag};
 use crate::syntax::print_expr;
 use crate::syntax::span::Span;
@@ -11,22 +12,23 @@ use std::sync::Arc;
 
 impl Lowerer<'_> {
     /// `x ~ d`: gives the choice.
-    pub fn named_draw(&mut self, name: &Name, dist: &Expr, tags: &[Tag], span: Span) -> Typed {
+    pub fn named_draw(&mut self, name: &Name, dist: &Expr, tags: &[Tag]) -> Typed {
         let spec = self.below(&name.node, |l| l.dist_spec(dist, false));
         let tags = self.tags(tags);
         let ty = self.drawn_type(&spec);
         let site = self.site(&name.node, tags, 0);
-        let slot = self.push(Op::Draw { dist: spec, site, keys: Box::default() }, span);
+        let slot = self.push(Op::Draw { dist: spec, site, keys: Box::default() }, dist.span);
         Typed { at: Operand::Local(slot), ty }
     }
 
     /// What a family draws, where it can be told.
     fn drawn_type(&self, d: &DistSpec) -> Type {
         match d {
-            DistSpec::Family { builtin, .. } => match self.code.builtins.get(*builtin).name {
+            DistSpec::Family { builtin, args } => match self.code.builtins.get(*builtin).name {
                 "flip" => Type::Any,
                 "dirichlet" | "mv_normal" | "gp" => Type::Array,
                 "iid" => Type::Any,
+                _ if args.iter().all(|a| self.is_number(*a)) => Type::Num,
                 // A parameter that is an array makes the choice one.
                 _ => Type::Nums,
             },
@@ -34,8 +36,12 @@ impl Lowerer<'_> {
         }
     }
 
+    fn is_number(&self, o: Operand) -> bool {
+        matches!(o, Operand::Const(i) if matches!(self.code.const_value(i), Value::Num(_)))
+    }
+
     /// `t[k] ~ d`.
-    pub fn keyed_draw(&mut self, target: &Expr, dist: &Expr, tags: &[Tag], span: Span) {
+    pub fn keyed_draw(&mut self, target: &Expr, dist: &Expr, tags: &[Tag]) {
         let Some((name, keys)) = keyed_target(target) else {
             self.error("a choice is drawn into a name or an element", target.span, "expected `x` or `t[k]`");
             return;
@@ -76,7 +82,7 @@ impl Lowerer<'_> {
         };
         let own: Box<[Operand]> = if plain { Box::default() } else { operands.clone().into() };
         let site = self.site(&name.node, tags, carried);
-        let slot = self.push(Op::Draw { dist: spec, site, keys: own }, span);
+        let slot = self.push(Op::Draw { dist: spec, site, keys: own }, dist.span);
         let written = keys.iter().map(|k| format!("[{}]", print_expr(k))).collect::<String>();
 
         // The loops between the container and the draw.

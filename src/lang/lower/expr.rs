@@ -3,7 +3,6 @@
 use super::scope::{Meaning, Scope, ScopeKind};
 use super::types::shown;
 use super::{AddHint, Lowerer, Typed};
-use crate::diag::nearest;
 use crate::lang::builtins::{Kind, Type};
 use crate::lang::code::{BlockKind, Op, Operand};
 use crate::lang::value::{Closure, Value};
@@ -51,7 +50,7 @@ impl Lowerer<'_> {
                 self.operator(name, &[(v, expr.span)], e.span)
             }
             ExprKind::Binary { op, left, right } => self.binary(*op, left, right, e.span),
-            ExprKind::If { cond, then, otherwise } => self.if_else(cond, then, otherwise, e.span),
+            ExprKind::If { cond, then, otherwise } => self.if_else(cond, then, otherwise),
             ExprKind::Lambda(l) => self.lambda(l, &Arc::from("fn"), e.span),
             ExprKind::Error => self.nothing(),
         }
@@ -120,36 +119,6 @@ impl Lowerer<'_> {
             .hint_also(format!("infer {{ repeat 1000 {{ {name}(…); }} }}"));
     }
 
-    /// A name nobody knows.
-    pub fn unbound(&mut self, name: &str, span: Span) {
-        let visible = self.visible();
-        let builtins = Arc::clone(&self.code.builtins);
-        let known = builtins
-            .iter()
-            .filter(|b| b.module.is_empty() && b.name.starts_with(|c: char| c.is_alphabetic()))
-            .filter(|b| !matches!(b.kind, Kind::Inference))
-            .map(|b| b.name);
-        let near = nearest(name, visible.iter().map(|n| &**n).chain(known)).map(str::to_owned);
-        // A name of a namespace, written without it.
-        let inside = self.modules[self.module].namespaces.iter().find_map(|(ns, space)| {
-            let module = &self.modules[space.module];
-            let native = module.native.as_deref().is_some_and(|m| builtins.find(m, name).is_some());
-            (native || module.names.contains_key(name)).then(|| format!("{ns}.{name}"))
-        });
-        let later = self.modules[self.module].names.get(name).map(|b| b.span);
-        let lives = builtins.iter().find(|b| b.name == name && !b.module.is_empty());
-        let lives = lives.map(|b| format!("include \"std/{0}.pcad\" as {0}; then write {0}.{name}", b.module));
-        let e = self.error(format!("unknown name `{name}`"), span, "not bound here");
-        if let Some(at) = later {
-            e.point_at(at, "bound later");
-        }
-        if let Some(hint) =
-            inside.map(|i| format!("did you mean `{i}`?")).or(near.map(|n| format!("did you mean `{n}`?"))).or(lives)
-        {
-            e.hint_also(hint);
-        }
-    }
-
     fn record(&mut self, fields: &[(Name, Expr)], span: Span) -> Typed {
         let mut names: Vec<Arc<str>> = Vec::with_capacity(fields.len());
         let mut values = Vec::with_capacity(fields.len());
@@ -192,7 +161,14 @@ impl Lowerer<'_> {
                 Type::Num | Type::Int | Type::Bool | Type::Str | Type::Dist | Type::Function | Type::Likelihood
             ) {
                 let message = format!("{} has no elements", shown(value.ty));
-                self.error(message, e.span, "cannot be indexed");
+                self.error(message, base.span, format!("this is {}", shown(value.ty)));
+                return self.nothing();
+            }
+            if matches!(value.ty, Type::Array | Type::Nums)
+                && matches!(key.ty, Type::Bool | Type::Str | Type::Record | Type::Dist | Type::Function)
+            {
+                let message = format!("an array is indexed by a whole number, got {}", shown(key.ty));
+                self.error(message, k.span, format!("this is {}", shown(key.ty)));
                 return self.nothing();
             }
             value = self.op(Op::Index { base: value.at, keys: [key.at].into() }, Type::Any, e.span);
@@ -210,10 +186,15 @@ impl Lowerer<'_> {
         let value = self.expr(base);
         if matches!(
             value.ty,
-            Type::Num | Type::Int | Type::Bool | Type::Str | Type::Array | Type::Dist | Type::Function
+            Type::Num | Type::Int | Type::Bool | Type::Str | Type::Array | Type::Nums | Type::Dist | Type::Function
         ) {
             let message = format!("{} has no field `{}`", shown(value.ty), field.node);
-            self.error(message, field.span, format!("this is asked of {}", shown(value.ty)));
+            let e = self.error(message, base.span, format!("this is {}", shown(value.ty)));
+            match value.ty {
+                Type::Array => e.hint_also("elements of an array are taken by number: a[0], a[1], …"),
+                Type::Function => e.hint_also(format!("call it first: f(…).{}", field.node)),
+                _ => {}
+            }
             return self.nothing();
         }
         let key = self.constant(Value::Str(Arc::clone(&field.node)));
@@ -240,20 +221,6 @@ impl Lowerer<'_> {
         self.nothing()
     }
 
-    pub fn no_member(&mut self, ns: &str, module: usize, field: &Name) {
-        let table = Arc::clone(&self.code.builtins);
-        let m = &self.modules[module];
-        let native = m.native.clone();
-        let own = m.names.keys().cloned().collect::<Vec<_>>();
-        let natives = table.iter().filter(|b| native.as_deref() == Some(b.module)).map(|b| b.name);
-        let known: Vec<&str> = own.iter().map(|n| &**n).chain(natives).collect();
-        let hint = match nearest(&field.node, known.iter().copied()) {
-            Some(n) => format!("did you mean `{ns}.{n}`?"),
-            None => format!("it has {}", known.join(", ")),
-        };
-        self.error(format!("`{ns}` has no `{}`", field.node), field.span, "unknown name").hint_also(hint);
-    }
-
     /// The index of a built-in of the language, or of the native module whose file this is.
     pub fn find_builtin(&self, name: &str) -> Option<u32> {
         let native = self.modules[self.module].native.as_deref();
@@ -273,7 +240,7 @@ impl Lowerer<'_> {
                 });
                 let fixed = self.branch(|_| Some(Typed { at: settled, ty: Type::Bool }));
                 let (then, otherwise) = if op == BinaryOp::And { (other.0, fixed.0) } else { (fixed.0, other.0) };
-                self.op(Op::If { cond: cond.at, then, otherwise }, Type::Bool, span)
+                self.op(Op::If { cond: cond.at, then, otherwise }, Type::Bool, left.span)
             }
             BinaryOp::Intersect => {
                 self.error("`&` joins selections of choices", span, "not in the model")
@@ -290,27 +257,25 @@ impl Lowerer<'_> {
     /// An operator of the table.
     fn operator(&mut self, name: &str, args: &[(Typed, Span)], span: Span) -> Typed {
         let Some(builtin) = self.code.builtins.find("", name) else { return self.nothing() };
-        if name != "==" && name != "!=" && name != "*" && name != "+" {
-            for (v, at) in args {
-                let number = matches!(v.ty, Type::Any | Type::Num | Type::Int | Type::Nums | Type::Array);
-                let fits = number || (name == "not" && v.ty == Type::Bool);
-                if !fits {
-                    let shown_op = if name == "neg" { "-" } else { name };
-                    let wanted = if name == "not" { "a bool" } else { "numbers or arrays of them" };
-                    let message = format!("`{shown_op}` needs {wanted}, got {}", shown(v.ty));
-                    self.error(message, *at, format!("this is {}", shown(v.ty)));
-                }
+        // One message for one operator.
+        if let Some((v, at)) = args.iter().find(|(v, _)| !operand_fits(name, v.ty)) {
+            let shown_op = if name == "neg" { "-" } else { name };
+            let wanted = match name {
+                "not" => "a bool",
+                "+" | "<" | "<=" | ">" | ">=" => "numbers, arrays of them, or strings",
+                "*" => "numbers, arrays of them, or a placement and a solid",
+                ".." => "whole numbers",
+                _ => "numbers or arrays of them",
+            };
+            let message = format!("`{shown_op}` needs {wanted}, got {}", shown(v.ty));
+            let e = self.error(message, *at, format!("this is {}", shown(v.ty)));
+            match v.ty {
+                Type::Dist => e.hint_also("draw from it first: x ~ …; then use x"),
+                Type::Function => e.hint_also("call it: f(…)"),
+                Type::Num | Type::Int if name == "not" => e.hint_also("compare it, e.g. x == 0"),
+                _ => {}
             }
-        } else if matches!(name, "*" | "+") {
-            for (v, at) in args {
-                if matches!(v.ty, Type::Bool | Type::Function | Type::Dist | Type::Likelihood | Type::Record) {
-                    let message = format!("`{name}` needs numbers or arrays of them, got {}", shown(v.ty));
-                    let e = self.error(message, *at, format!("this is {}", shown(v.ty)));
-                    if v.ty == Type::Dist {
-                        e.hint_also("draw from it first: `let x = …` does not draw, `x ~ …` does");
-                    }
-                }
-            }
+            return self.nothing();
         }
         let comparison = matches!(name, "==" | "!=" | "<" | "<=" | ">" | ">=" | "not");
         let all_numbers = args.iter().all(|(v, _)| matches!(v.ty, Type::Num | Type::Int));
@@ -334,13 +299,13 @@ impl Lowerer<'_> {
         }
     }
 
-    fn if_else(&mut self, cond: &Expr, then: &Body, otherwise: &Body, span: Span) -> Typed {
+    fn if_else(&mut self, cond: &Expr, then: &Body, otherwise: &Body) -> Typed {
         let c = self.expr(cond);
         self.check_bool(c, cond.span, "`if` needs a bool");
         let a = self.branch(|l| l.body_of(then));
         let b = self.branch(|l| l.body_of(otherwise));
         let ty = if a.1 == b.1 { a.1 } else { Type::Any };
-        self.op(Op::If { cond: c.at, then: a.0, otherwise: b.0 }, ty, span)
+        self.op(Op::If { cond: c.at, then: a.0, otherwise: b.0 }, ty, cond.span)
     }
 
     /// A block of its own that runs or not.
@@ -358,6 +323,19 @@ impl Lowerer<'_> {
         let block = self.function_block(Arc::clone(name), l);
         self.function_body(block, l);
         self.op(Op::Closure(block), Type::Function, span)
+    }
+}
+
+/// Whether an operator can take an operand that looks like this.
+fn operand_fits(name: &str, ty: Type) -> bool {
+    match (name, ty) {
+        ("==" | "!=", _) | (_, Type::Any | Type::Array) => true,
+        ("not", ty) => ty == Type::Bool,
+        (_, Type::Num | Type::Int | Type::Nums) => true,
+        ("+" | "<" | "<=" | ">" | ">=", Type::Str) => true,
+        ("+", Type::Covariance) => true,
+        ("*", Type::Covariance | Type::Object(_)) => true,
+        _ => false,
     }
 }
 

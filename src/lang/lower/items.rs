@@ -11,6 +11,19 @@ use crate::syntax::ast::{Declaration, Expr, ExprKind, FnDecl, Item, ItemKind, La
 use crate::syntax::parse_expr;
 use std::sync::Arc;
 
+/// The types a parameter may have.
+const TYPES: [&str; 5] = ["number", "int", "bool", "string", "array"];
+
+/// The name by which a later `forget` can remove an item.
+fn forgettable(item: &Item) -> Option<&crate::syntax::ast::Name> {
+    let ItemKind::Stmt(s) = &item.kind else { return None };
+    match &s.kind {
+        StmtKind::Assume { name, .. } | StmtKind::Predict { name, .. } => Some(name),
+        StmtKind::Observe { name, .. } | StmtKind::Factor { name, .. } => name.as_ref(),
+        _ => None,
+    }
+}
+
 impl Lowerer<'_> {
     /// Lowers a file into the current module.
     pub fn unit(&mut self, index: usize) {
@@ -40,8 +53,9 @@ impl Lowerer<'_> {
                             let old = self.modules[self.module].namespaces.insert(Arc::clone(&alias.node), space);
                             if let Some(old) = old {
                                 let message = format!("the namespace `{}` is used twice", alias.node);
-                                self.error(message, alias.span, "used again here")
-                                    .point_at(old.span, "first used here");
+                                let e = self.error(message, alias.span, "used again here");
+                                e.point_at(old.span, "first used here");
+                                e.hint_also("give one of them another name after `as`, or include the file once");
                             }
                             let outer = std::mem::replace(&mut self.module, module);
                             self.unit(included);
@@ -60,8 +74,10 @@ impl Lowerer<'_> {
                 ItemKind::Fn(_) => {}
                 ItemKind::Kernel(k) => {
                     if let Some(old) = self.kernels.insert(Arc::clone(&k.name.node), k.clone()) {
-                        let e = self.error(format!("the kernel `{}` is declared twice", k.name.node), k.name.span, "");
-                        e.point_at(old.name.span, "first here");
+                        let message = format!("the kernel `{}` is declared twice", k.name.node);
+                        let e = self.error(message, k.name.span, "declared again here");
+                        e.point_at(old.name.span, "first declared here");
+                        e.hint_also("give one of them another name");
                     }
                 }
                 // A plan of an included file is that file's own.
@@ -95,20 +111,18 @@ impl Lowerer<'_> {
                 self.error("`forget` takes the name of an observation or assume", e.span, "not a name");
                 continue;
             };
-            let is_it = |item: &Item| match &item.kind {
-                ItemKind::Stmt(s) => match &s.kind {
-                    StmtKind::Assume { name: n, .. } | StmtKind::Predict { name: n, .. } => n.node == name,
-                    StmtKind::Observe { name: Some(n), .. } | StmtKind::Factor { name: Some(n), .. } => n.node == name,
-                    _ => false,
-                },
-                _ => false,
-            };
+            let is_it = |item: &Item| forgettable(item).is_some_and(|n| n.node == name);
             match (0..i).rev().find(|j| !gone.contains(j) && is_it(&items[*j])) {
                 Some(j) => gone.push(j),
                 None => {
                     let message = format!("nothing named `{name}` was observed or assumed before");
-                    self.error(message, e.span, "cannot be forgotten")
-                        .hint_also("name an observation with `as` to be able to forget it");
+                    let names = items[..i].iter().filter_map(forgettable).collect::<Vec<_>>();
+                    let near = nearest(&name, names.iter().map(|n| &*n.node)).map(str::to_owned);
+                    let e = self.error(message, e.span, "cannot be forgotten");
+                    match near {
+                        Some(n) => e.hint_also(format!("did you mean `{n}`?")),
+                        None => e.hint_also("name an observation with `as` to be able to forget it"),
+                    }
                 }
             }
         }
@@ -132,7 +146,8 @@ impl Lowerer<'_> {
         let required = lambda.params.iter().position(|p| p.default.is_some()).unwrap_or(lambda.params.len());
         if let Some(p) = lambda.params[required..].iter().find(|p| p.default.is_none()) {
             let message = format!("the parameter `{}` needs a default", p.name.node);
-            self.error(message, p.name.span, "comes after one that has a default");
+            self.error(message, p.name.span, "comes after one that has a default")
+                .hint_also("put those without a default first");
         }
         self.new_block(BlockKind::Function { name, params, required })
     }
@@ -175,8 +190,12 @@ impl Lowerer<'_> {
         let name = self.global_name(&d.name);
         let ty = match &d.ty {
             Some(t) => declared(&t.node).unwrap_or_else(|| {
+                let near = nearest(&t.node, TYPES).map(str::to_owned);
                 let e = self.error(format!("there is no parameter type `{}`", t.node), t.span, "unknown type");
-                e.hint_also("types are number, int, bool, string and array");
+                match near {
+                    Some(n) => e.hint_also(format!("did you mean `{n}`?")),
+                    None => e.hint_also(format!("types are {}", TYPES.join(", "))),
+                }
                 Type::Any
             }),
             None => d.default.as_ref().map_or(Type::Any, literal_type),
@@ -189,7 +208,9 @@ impl Lowerer<'_> {
             }
             (None, Some(e)) => {
                 let value = self.expr(e);
-                self.check_type(value, ty, e.span, &format!("the default of `{}`", d.name.node));
+                let what = format!("the default of `{}`", d.name.node);
+                self.check_type(value, ty, e.span, &what);
+                self.check_whole(value, ty, e.span, &what);
                 value
             }
             (None, None) => {
@@ -213,19 +234,24 @@ impl Lowerer<'_> {
             Ok(e) => {
                 let value = self.expr(&e);
                 self.check_type(value, ty, e.span, &format!("`{name}`"));
-                if ty == Type::Int
-                    && let crate::lang::code::Operand::Const(i) = value.at
-                    && let Value::Num(x) = self.code.const_value(i)
-                    && *x != libm::trunc(*x)
-                {
-                    self.error(format!("`{name}` must be a whole number"), e.span, "not whole");
-                }
+                self.check_whole(value, ty, e.span, &format!("`{name}`"));
                 value
             }
             Err(errors) => {
                 self.errors.extend(errors.into_iter().map(IntoDiagnostic::into_diagnostic));
                 self.nothing()
             }
+        }
+    }
+
+    /// A number that is known must be whole where that is asked for.
+    fn check_whole(&mut self, value: Typed, wanted: Type, span: crate::syntax::span::Span, what: &str) {
+        if wanted == Type::Int
+            && let crate::lang::code::Operand::Const(i) = value.at
+            && let Value::Num(x) = self.code.const_value(i)
+            && *x != libm::trunc(*x)
+        {
+            self.error(format!("{what} must be a whole number, got {x}"), span, "not whole");
         }
     }
 

@@ -6,11 +6,12 @@
 //!
 //! One file a concern: [`scope`] names and sites, [`items`] the top level, [`stmt`] statements, [`draw`] random choices and
 //! containers, [`expr`] expressions, [`call`] calls, [`plan`] inference blocks, [`select`] selections, [`types`] what can be
-//! told of types.
+//! told of types, [`hints`] what to say of unknown names.
 
 mod call;
 mod draw;
 mod expr;
+mod hints;
 mod interface;
 mod items;
 mod plan;

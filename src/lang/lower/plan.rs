@@ -55,7 +55,8 @@ impl Lowerer<'_> {
         match &s.kind {
             KStmtKind::Warmup { count, body } => {
                 if around.in_loop || around.in_kernel {
-                    self.error("`warmup` stands at the top of an inference block", s.span, "inside a loop or kernel");
+                    self.error("`warmup` stands at the top of an inference block", s.span, "inside a loop or kernel")
+                        .hint_also("infer { warmup 1000 { … } repeat 1000 { … collect x; } }");
                 }
                 self.count(count, around);
                 let mut inner = Around { in_loop: true, in_warmup: true, ..around.clone() };
@@ -85,7 +86,8 @@ impl Lowerer<'_> {
             }
             KStmtKind::StopWhen(e) => {
                 if !around.in_loop {
-                    self.error("`stop when` belongs in a loop, which it ends", s.span, "no loop around it");
+                    self.error("`stop when` belongs in a loop, which it ends", s.span, "no loop around it")
+                        .hint_also("repeat 1000 { … stop when …; }");
                 }
                 self.plan_expr(e, around);
             }
@@ -124,7 +126,14 @@ impl Lowerer<'_> {
     fn count(&mut self, e: &Expr, around: &Around) {
         match &e.kind {
             ExprKind::Str(_) | ExprKind::Bool(_) | ExprKind::Array(_) | ExprKind::Record(_) => {
-                self.error("a number was expected", e.span, "not a number");
+                let got = match &e.kind {
+                    ExprKind::Str(_) => Type::Str,
+                    ExprKind::Bool(_) => Type::Bool,
+                    ExprKind::Array(_) => Type::Array,
+                    _ => Type::Record,
+                };
+                let label = format!("this is {}", shown(got));
+                self.error(format!("a number was expected, got {}", shown(got)), e.span, label);
             }
             _ => self.plan_expr(e, around),
         }
@@ -144,7 +153,12 @@ impl Lowerer<'_> {
         if let Some(k) = self.kernels.get(name).cloned() {
             let required = k.params.iter().filter(|p| p.default.is_none()).count();
             if args.len() < required || args.len() > k.params.len() {
-                let message = format!("the kernel `{name}` takes {} arguments, got {}", k.params.len(), args.len());
+                let takes = match k.params.len() {
+                    0 => "no arguments".to_owned(),
+                    1 => "1 argument".to_owned(),
+                    n => format!("{n} arguments"),
+                };
+                let message = format!("the kernel `{name}` takes {takes}, got {}", args.len());
                 self.error(message, e.span, "in this call").point_at(k.name.span, "declared here");
             }
             for a in args {
@@ -159,7 +173,8 @@ impl Lowerer<'_> {
                     return;
                 }
                 if &**name == "init" && around.in_loop {
-                    self.error("`init` stands at the top of an inference block", e.span, "inside a loop");
+                    self.error("`init` stands at the top of an inference block", e.span, "inside a loop")
+                        .hint_also("infer { init(best_of(100)); repeat 1000 { … } }");
                 }
                 if &**name == "anneal" && !around.in_warmup {
                     self.error("`anneal` belongs in a `warmup`", e.span, "draws are kept here")
@@ -167,7 +182,12 @@ impl Lowerer<'_> {
                 }
                 self.inference_args(&b, args, e.span, around);
             }
-            _ => {
+            found => {
+                let other = match found.map(|b| b.kind) {
+                    Some(Kind::Distribution(_)) => Some("a distribution"),
+                    Some(_) => Some("a function"),
+                    None => self.modules[0].names.contains_key(name).then_some("a name of the model"),
+                };
                 let table = Arc::clone(&self.code.builtins);
                 let known = table
                     .iter()
@@ -175,7 +195,11 @@ impl Lowerer<'_> {
                     .map(|b| b.name);
                 let own: Vec<Arc<str>> = self.kernels.keys().cloned().collect();
                 let near = crate::diag::nearest(name, known.chain(own.iter().map(|n| &**n))).map(str::to_owned);
-                let e = self.error(format!("unknown kernel `{name}`"), callee.span, "not a kernel");
+                let message = match other {
+                    Some(what) => format!("a kernel was expected, `{name}` is {what}"),
+                    None => format!("unknown kernel `{name}`"),
+                };
+                let e = self.error(message, callee.span, "not a kernel");
                 match near {
                     Some(n) => e.hint_also(format!("did you mean `{n}`?")),
                     None => e.hint_also("kernels are mh, block, drift, gibbs, elliptical; see `pcadlang doc`"),
@@ -189,8 +213,9 @@ impl Lowerer<'_> {
         let order = match b.match_names(args.iter().map(|a| a.name.as_ref().map(|n| &*n.node))) {
             Ok(order) => order,
             Err(message) => {
-                let e = self.error(message, span, "in this call");
-                if b.args.first().is_some_and(|a| a.ty == Type::Selection) {
+                let e = self.mismatch(b, message, args, span);
+                if args.is_empty() && b.args.first().is_some_and(|a| a.ty == Type::Selection) {
+                    e.hints.clear();
                     e.hint_also(format!("the selection comes first: {}(@**)", b.name));
                 }
                 return;
@@ -202,6 +227,13 @@ impl Lowerer<'_> {
             match arg.ty {
                 Type::Selection => self.selection(value, &around.names.clone()),
                 Type::Kernel => self.kernel_or_start(b.name, value, around),
+                Type::Num | Type::Int | Type::Nums
+                    if matches!(value.kind, ExprKind::Address(_) | ExprKind::TagSel { .. } | ExprKind::Str(_)) =>
+                {
+                    let message = format!("{}: `{}` must be {}", b.name, arg.name, shown(arg.ty));
+                    let label = if matches!(value.kind, ExprKind::Str(_)) { "this is a string" } else { "a selection" };
+                    self.error(message, value.span, label).hint_also(b.signature());
+                }
                 _ => self.plan_expr(value, around),
             }
         }
@@ -221,7 +253,8 @@ impl Lowerer<'_> {
                 }
             }
             _ => {
-                self.error("`init` takes prior() or best_of(n)", e.span, "not a start");
+                self.error("`init` takes prior() or best_of(n)", e.span, "not a start")
+                    .hint_also("init(best_of(100)); starts from the best of 100 draws from the prior");
             }
         }
     }
@@ -250,7 +283,7 @@ impl Lowerer<'_> {
                         Some(b) => {
                             if let Err(message) = b.match_names(args.iter().map(|a| a.name.as_ref().map(|n| &*n.node)))
                             {
-                                self.error(message, e.span, "in this call");
+                                self.mismatch(&b, message, args, e.span);
                             }
                         }
                         None if self.modules[0].names.contains_key(name) => {}
@@ -302,7 +335,7 @@ impl Lowerer<'_> {
             if matches!(b.kind, Kind::Inference) {
                 match b.match_names(args.iter().map(|a| a.name.as_ref().map(|n| &*n.node))) {
                     Err(message) => {
-                        self.error(message, e.span, "in this call");
+                        self.mismatch(&b, message, args, e.span);
                     }
                     Ok(order) => {
                         for (p, j) in order.iter().enumerate() {

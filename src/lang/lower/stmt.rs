@@ -23,7 +23,7 @@ impl Lowerer<'_> {
         match &s.kind {
             StmtKind::Assume { name, bind, expr, tags } => {
                 let value = match bind {
-                    Bind::Random => self.named_draw(name, expr, tags, s.span),
+                    Bind::Random => self.named_draw(name, expr, tags),
                     Bind::Value => {
                         let tags = self.constant_tags(tags);
                         self.with_tags(tags, |l| l.below(&name.node, |l| l.expr(expr)))
@@ -36,7 +36,7 @@ impl Lowerer<'_> {
             }
             StmtKind::Predict { name, bind, expr } => {
                 let value = match bind {
-                    Bind::Random => self.named_draw(name, expr, &[], s.span),
+                    Bind::Random => self.named_draw(name, expr, &[]),
                     Bind::Value => self.below(&name.node, |l| l.expr(expr)),
                 };
                 self.bind_value(name, value);
@@ -51,10 +51,10 @@ impl Lowerer<'_> {
             StmtKind::Draw { target, dist, tags } => match &target.kind {
                 ExprKind::Var(name) => {
                     let name = Name::new(Arc::clone(name), target.span);
-                    let value = self.named_draw(&name, dist, tags, s.span);
+                    let value = self.named_draw(&name, dist, tags);
                     self.bind_value(&name, value);
                 }
-                _ => self.keyed_draw(target, dist, tags, s.span),
+                _ => self.keyed_draw(target, dist, tags),
             },
             StmtKind::Let { name, expr } => {
                 let value = self.below(&name.node, |l| l.expr_named(expr, &name.node));
@@ -70,14 +70,14 @@ impl Lowerer<'_> {
                 });
                 let label = name.as_ref().map_or_else(|| Arc::from("obs"), |n| Arc::clone(&n.node));
                 let site = self.site(&label, Vec::new(), 0);
-                self.push(Op::Observe { dist: spec, value: observed.at, coarse, site }, s.span);
+                self.push(Op::Observe { dist: spec, value: observed.at, coarse, site }, dist.span);
             }
             StmtKind::Factor { expr, name } => {
                 let weight = self.expr(expr);
                 self.check_type(weight, Type::Num, expr.span, "the log weight of a factor");
                 let label = name.as_ref().map_or_else(|| Arc::from("factor"), |n| Arc::clone(&n.node));
                 let site = self.site(&label, Vec::new(), 0);
-                self.push(Op::Factor { weight: weight.at, site }, s.span);
+                self.push(Op::Factor { weight: weight.at, site }, expr.span);
             }
             StmtKind::Force { target, value } => {
                 let value = self.expr(value);

@@ -175,10 +175,16 @@ fn score_value(dist: &Dist, observed: &Value) -> Result<Score, Fault> {
         }
         return sum_scores(count, |i| {
             let x = observed.element(i).as_ref().and_then(Value::to_datum).ok_or_else(wrong)?;
+            if matches!(x, Datum::Num(x) if x.is_nan()) {
+                return Err(Fault::domain(format!("element {i} of what is observed is not a number")));
+            }
             Ok(dist.element_log_density(i, &x))
         });
     }
+    let nan = || Fault::domain("the observed value is not a number");
     match observed {
+        Value::Num(x) if x.is_nan() => Err(nan()),
+        Value::Array(xs) if xs.iter().any(|x| x.is_nan()) => Err(nan()),
         Value::Num(x) => Ok(Score::One(dist.log_density(&Datum::Num(*x)))),
         Value::Bool(b) => Ok(Score::One(dist.log_density(&Datum::Bool(*b)))),
         Value::Array(xs) if dist.is_scalar() => sum_scores(xs.len(), |i| Ok(dist.log_density(&Datum::Num(xs[i])))),
