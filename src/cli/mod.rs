@@ -10,12 +10,12 @@ mod progress;
 mod run;
 mod sample;
 mod scene;
+mod term;
 
 use args::{Cli, Command};
 use pcadlang::Error;
-use pcadlang::diag::render;
-use std::io::IsTerminal;
 use std::process::ExitCode;
+use term::has_colors;
 
 /// Why a command failed.
 pub enum Failure {
@@ -49,22 +49,6 @@ pub fn main(cli: Cli) -> ExitCode {
     };
     match done {
         Ok(()) => ExitCode::SUCCESS,
-        Err(Failure::Program(e)) => {
-            eprint!("{}", render(&e.sources, &e.diagnostics, has_colors()));
-            ExitCode::from(1)
-        }
-        Err(Failure::Plain(message, hint)) => {
-            eprintln!("error: {message}");
-            if let Some(h) = hint {
-                eprintln!("  = hint: {h}");
-            }
-            ExitCode::from(1)
-        }
-        Err(Failure::Interrupted) => ExitCode::from(3),
+        Err(failure) => ExitCode::from(term::fail(failure)),
     }
-}
-
-/// Whether messages may have colours: on a terminal, unless NO_COLOR is set (https://no-color.org).
-fn has_colors() -> bool {
-    std::io::stderr().is_terminal() && std::env::var_os("NO_COLOR").is_none_or(|v| v.is_empty())
 }

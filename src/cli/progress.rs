@@ -1,37 +1,76 @@
 //! The live line of a run: only on a terminal.
 
+use super::term;
 use indicatif::{ProgressBar, ProgressDrawTarget, ProgressStyle};
 use pcadlang::infer::Progress;
-use std::io::IsTerminal;
+use pcadlang::report::{number, seconds};
 use std::sync::atomic::{AtomicBool, Ordering};
 use std::time::{Duration, Instant};
 
+/// Between two looks at the chains.
+const PAUSE: Duration = Duration::from_millis(100);
+
 /// Shows progress until `done`; a limit of time makes it a bar.
 pub fn watch(progress: &Progress, done: &AtomicBool, limit: Option<Duration>, quiet: bool) {
-    if quiet || !std::io::stderr().is_terminal() {
+    if quiet || !term::is_live() {
         return;
     }
     let begun = Instant::now();
-    let bar = ProgressBar::with_draw_target(limit.map(|t| t.as_millis() as u64), ProgressDrawTarget::stderr());
-    let template = if limit.is_some() { "{wide_bar} {msg}" } else { "{spinner} {msg}" };
+    let length = limit.map(|t| u64::try_from(t.as_millis()).unwrap_or(u64::MAX));
+    let bar = ProgressBar::with_draw_target(length, ProgressDrawTarget::stderr());
+    let template = if limit.is_some() { "{bar:24} {wide_msg}" } else { "{spinner} {wide_msg}" };
     if let Ok(style) = ProgressStyle::with_template(template) {
         bar.set_style(style);
     }
     while !done.load(Ordering::Relaxed) {
-        let steps = progress.steps.load(Ordering::Relaxed);
         let elapsed = begun.elapsed();
-        let best = f64::from_bits(progress.best.load(Ordering::Relaxed));
-        let mut message = format!("{steps} steps, {:.0} a second", steps as f64 / elapsed.as_secs_f64().max(1e-3));
-        if steps > 0 && best.is_finite() && best != 0.0 {
-            message.push_str(&format!(", best log joint {best:.1}"));
+        let steps = progress.steps.load(Ordering::Relaxed);
+        // No bits: nothing is known yet.
+        let best = Some(progress.best.load(Ordering::Relaxed)).filter(|bits| *bits != 0).map(f64::from_bits);
+        if limit.is_some() {
+            bar.set_position(u64::try_from(elapsed.as_millis()).unwrap_or(u64::MAX));
         }
-        if let Some(limit) = limit {
-            message.push_str(&format!(", {:.0} s left", limit.saturating_sub(elapsed).as_secs_f64()));
-            bar.set_position(elapsed.as_millis() as u64);
-        }
-        bar.set_message(message);
+        bar.set_message(line(steps, elapsed, best, limit));
         bar.tick();
-        std::thread::sleep(Duration::from_millis(100));
+        std::thread::sleep(PAUSE);
     }
     bar.finish_and_clear();
+}
+
+/// What is said: steps and their rate, the best score, the time left (or the time taken, if there is no limit).
+fn line(steps: u64, elapsed: Duration, best: Option<f64>, limit: Option<Duration>) -> String {
+    let mut s = format!("{steps} steps");
+    if elapsed.as_secs_f64() >= 0.5 {
+        s.push_str(&format!(", {} a second", number((steps as f64 / elapsed.as_secs_f64()).round())));
+    }
+    if let Some(best) = best.filter(|b| b.is_finite()) {
+        s.push_str(&format!(", best log joint {best:.1}"));
+    }
+    match limit {
+        Some(limit) if elapsed < limit => s.push_str(&format!(", {} left", whole(limit - elapsed))),
+        Some(_) => s.push_str(", finishing"),
+        None => s.push_str(&format!(", {}", whole(elapsed))),
+    }
+    s
+}
+
+/// A time in whole seconds, so that the line does not flicker.
+fn whole(t: Duration) -> String {
+    if t.as_secs() < 120 { format!("{} s", t.as_secs()) } else { seconds(t.as_secs_f64()) }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    #[test]
+    fn the_line_says_what_is_known() {
+        let s = Duration::from_secs;
+        assert_eq!(line(0, s(0), None, None), "0 steps, 0 s");
+        assert_eq!(
+            line(500, s(2), Some(-12.34), Some(s(300))),
+            "500 steps, 250 a second, best log joint -12.3, 4 min 58 s left"
+        );
+        assert_eq!(line(9, s(3), Some(f64::NEG_INFINITY), Some(s(3))), "9 steps, 3 a second, finishing");
+    }
 }

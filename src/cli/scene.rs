@@ -33,7 +33,7 @@ pub fn view(trace: &mut Trace, draws: Draws, camera: Option<Camera>) -> Option<A
 
 /// A frame as the reports want it.
 pub fn drawn(f: &Frame) -> Drawn<'_> {
-    Drawn { width: f.width, height: f.height, depth: &f.depth, normal: &f.normal }
+    Drawn { width: f.width, height: f.height, depth: &f.depth, normal: &f.normal, part: &f.part }
 }
 
 /// Contours as the reports want them.

@@ -28,7 +28,8 @@ pub struct Quantity {
 }
 
 /// Every scalar quantity of some chains, the log joint density (`log_joint`) first, with its summary. Columns are those
-/// of the first chain that has any; a chain whose draws lack one has none of it.
+/// of the first chain that has any; a chain whose draws lack one has none of it. A column that says the log joint density
+/// again is left out.
 pub fn quantities(chains: &[ChainDraws]) -> Vec<Quantity> {
     let quantity = |name: String, column, value: &dyn Fn(&DrawRow) -> Option<f64>| {
         let series: Vec<Vec<f64>> = chains.iter().map(|c| c.rows.iter().filter_map(value).collect()).collect();
@@ -38,6 +39,10 @@ pub fn quantities(chains: &[ChainDraws]) -> Vec<Quantity> {
     let columns = chains.iter().map(|c| &c.columns[..]).find(|c| !c.is_empty()).unwrap_or_default();
     let mut at = 0;
     for (index, column) in columns.iter().enumerate() {
+        if column.name == out[0].name && column.shape == Shape::Scalar && repeats(chains, at) {
+            at += 1;
+            continue;
+        }
         for i in 0..column.shape.len() {
             let name = match column.shape {
                 Shape::Scalar => column.name.clone(),
@@ -50,9 +55,37 @@ pub fn quantities(chains: &[ChainDraws]) -> Vec<Quantity> {
     out
 }
 
+/// Whether the numbers at a place of every row are the log joint density.
+fn repeats(chains: &[ChainDraws], at: usize) -> bool {
+    let mut rows = chains.iter().flat_map(|c| &c.rows);
+    rows.all(|r| r.values.get(at).is_some_and(|x| x.to_bits() == r.log_joint.to_bits()))
+}
+
 #[cfg(test)]
 mod tests {
     use super::*;
+
+    #[test]
+    fn the_log_joint_density_is_there_once() {
+        let row = |x: f64, said: f64| DrawRow {
+            chain: 0,
+            draw: 0,
+            step: 0,
+            log_joint: x,
+            log_prior: 0.0,
+            log_likelihood: 0.0,
+            values: vec![said, 7.0],
+        };
+        let chain = |rows| ChainDraws {
+            columns: vec![Column::scalar("log_joint"), Column::scalar("b")],
+            rows,
+            ..Default::default()
+        };
+        let names = |c: ChainDraws| quantities(&[c]).into_iter().map(|q| (q.name, q.chains)).collect::<Vec<_>>();
+        let one = names(chain(vec![row(1.0, 1.0), row(2.0, 2.0)]));
+        assert_eq!(one, [("log_joint".into(), vec![vec![1.0, 2.0]]), ("b".into(), vec![vec![7.0, 7.0]])]);
+        assert_eq!(names(chain(vec![row(1.0, 1.0), row(2.0, 3.0)])).len(), 3, "another thing of that name stays");
+    }
 
     #[test]
     fn vectors_become_elements() {

@@ -5,19 +5,19 @@
 
 pub mod csv;
 mod draws;
-mod encode;
 mod hash;
 pub mod html;
 pub mod npy;
 mod number;
 pub mod pictures;
-mod plots;
 mod rundir;
 mod sinks;
 pub mod table;
+mod warnings;
 
 pub use draws::{ChainDraws, Quantity, quantities};
 pub use hash::text_hash;
 pub use number::{number, seconds};
 pub use rundir::{RunDir, RunDirError};
 pub use sinks::{Memory, Tee};
+pub use warnings::warnings;

@@ -1,10 +1,30 @@
 //! The folder of a run: readable at any moment, never mixed with anything else.
+//!
+//! Invariant: a file written through [`RunDir::write`] is whole or absent; draws are the only files that grow. The folder
+//! holds one run: what an earlier run left is removed before the next one starts.
 
 use std::io::{self, Write};
 use std::path::{Path, PathBuf};
 
 /// The file every run folder has.
 pub const MARK: &str = "run.json";
+/// The ending of files that are being written.
+const PARTIAL: &str = ".partial";
+/// What a run writes besides `run.json`, the draws `chain-N.csv`, and what its program exports.
+const WRITTEN: [&str; 12] = [
+    "summary.json",
+    "best.trace.json",
+    "overlay.png",
+    "contours.png",
+    "uncertainty.png",
+    "mask.png",
+    "depth.npy",
+    "normals.npy",
+    "best.obj",
+    "best.glb",
+    "keypoints.json",
+    "report.html",
+];
 
 /// A folder that cannot be used.
 #[derive(Debug, thiserror::Error)]
@@ -29,19 +49,24 @@ pub struct RunDir {
 }
 
 impl RunDir {
-    /// Makes the folder; one that holds an earlier run is used again and its files are replaced.
+    /// Makes the folder. One that holds an earlier run is used again, and what that run left is removed first, so that
+    /// draws and pictures of two runs are never side by side.
     ///
     /// # Errors
     /// If it cannot be made, or holds files that are none of a run's.
     pub fn create(path: &Path) -> Result<RunDir, RunDirError> {
         let io = |error| RunDirError::Io { path: path.to_owned(), error };
-        if path.exists() {
-            let mut entries = std::fs::read_dir(path).map_err(io)?.peekable();
-            if entries.peek().is_some() && !path.join(MARK).exists() {
-                return Err(RunDirError::Occupied(path.to_owned()));
-            }
-        }
         std::fs::create_dir_all(path).map_err(io)?;
+        let names: Vec<_> =
+            std::fs::read_dir(path).map_err(io)?.map(|e| Ok(e?.file_name())).collect::<Result<_, _>>().map_err(io)?;
+        let names: Vec<&str> = names.iter().map(|n| n.to_str().unwrap_or("")).collect();
+        // A run that was killed before its first file was whole leaves only that.
+        if !names.contains(&MARK) && names.iter().any(|n| !is_partial(n)) {
+            return Err(RunDirError::Occupied(path.to_owned()));
+        }
+        for name in names.into_iter().filter(|n| is_partial(n) || is_chain(n) || WRITTEN.contains(n)) {
+            std::fs::remove_file(path.join(name)).map_err(io)?;
+        }
         Ok(RunDir { path: path.to_owned() })
     }
 
@@ -70,33 +95,99 @@ impl RunDir {
     /// # Errors
     /// If it cannot be written; an older file of the name is kept then.
     pub fn write(&self, name: &str, bytes: &[u8]) -> Result<(), RunDirError> {
-        let (path, partial) = (self.file(name), self.file(&format!(".{name}.partial")));
+        let (path, partial) = (self.file(name), self.file(&format!(".{name}{PARTIAL}")));
         let io = |error| RunDirError::Io { path: path.clone(), error };
-        let written = std::fs::File::create(&partial).and_then(|mut f| f.write_all(bytes));
-        if let Err(e) = written {
-            let _ = std::fs::remove_file(&partial);
-            return Err(io(e));
+        let mut written = std::fs::File::create(&partial).and_then(|mut f| f.write_all(bytes));
+        if written.is_ok() {
+            written = std::fs::rename(&partial, &path);
         }
-        std::fs::rename(&partial, &path).map_err(io)
+        written.map_err(|e| {
+            // The error that is told is the first one.
+            let _ = std::fs::remove_file(&partial);
+            io(e)
+        })
     }
+}
+
+/// Whether a file is half of one, as [`RunDir::write`] names them.
+fn is_partial(name: &str) -> bool {
+    name.starts_with('.') && name.ends_with(PARTIAL)
+}
+
+/// Whether a file holds the draws of a chain: `chain-N.csv`.
+fn is_chain(name: &str) -> bool {
+    let number = name.strip_prefix("chain-").and_then(|n| n.strip_suffix(".csv"));
+    number.is_some_and(|n| !n.is_empty() && n.bytes().all(|b| b.is_ascii_digit()))
 }
 
 #[cfg(test)]
 mod tests {
     use super::*;
 
+    /// An empty folder of a test's own.
+    fn base(name: &str) -> PathBuf {
+        let base = std::env::temp_dir().join(format!("pcadlang-rundir-{name}-{}", std::process::id()));
+        let _ = std::fs::remove_dir_all(&base);
+        base
+    }
+
+    fn names(dir: &Path) -> Vec<String> {
+        let mut all: Vec<_> =
+            std::fs::read_dir(dir).unwrap().map(|e| e.unwrap().file_name().into_string().unwrap()).collect();
+        all.sort();
+        all
+    }
+
     #[test]
     fn a_folder_of_something_else_is_left_alone() {
-        let base = std::env::temp_dir().join(format!("pcadlang-rundir-{}", std::process::id()));
-        let _ = std::fs::remove_dir_all(&base);
+        let base = base("else");
         let dir = RunDir::fresh(&base, "a").unwrap();
         dir.write(MARK, b"{}").unwrap();
         assert!(RunDir::create(dir.path()).is_ok(), "a run's folder may be used again");
         assert_eq!(RunDir::fresh(&base, "a").unwrap().path(), base.join("a-2"));
         std::fs::create_dir_all(base.join("b")).unwrap();
-        std::fs::write(base.join("b/photo.jpg"), b"x").unwrap();
+        std::fs::write(base.join("b/overlay.png"), b"x").unwrap();
         assert!(matches!(RunDir::create(&base.join("b")), Err(RunDirError::Occupied(_))));
-        assert_eq!(std::fs::read_dir(dir.path()).unwrap().count(), 1, "no partial file is left");
+        assert_eq!(names(&base.join("b")), ["overlay.png"], "nothing of it is removed");
+        std::fs::write(base.join("c"), b"x").unwrap();
+        assert!(matches!(RunDir::create(&base.join("c")), Err(RunDirError::Io { .. })), "a file is no folder");
+        std::fs::remove_dir_all(&base).unwrap();
+    }
+
+    #[test]
+    fn an_earlier_run_is_cleared_away_and_nothing_else() {
+        let base = base("earlier");
+        let dir = RunDir::create(&base).unwrap();
+        for name in
+            [MARK, "chain-1.csv", "chain-12.csv", "best.obj", ".report.html.partial", "notes.txt", "chain-x.csv"]
+        {
+            std::fs::write(dir.file(name), b"old").unwrap();
+        }
+        RunDir::create(&base).unwrap();
+        assert_eq!(names(&base), ["chain-x.csv", "notes.txt", MARK]);
+        std::fs::remove_dir_all(&base).unwrap();
+    }
+
+    #[test]
+    fn a_run_killed_at_its_start_does_not_block_the_folder() {
+        let base = base("killed");
+        std::fs::create_dir_all(&base).unwrap();
+        std::fs::write(base.join(".run.json.partial"), b"{").unwrap();
+        assert!(RunDir::create(&base).is_ok());
+        assert_eq!(names(&base), [""; 0]);
+        std::fs::remove_dir_all(&base).unwrap();
+    }
+
+    #[test]
+    fn writing_replaces_whole_files_and_leaves_no_parts() {
+        let base = base("writing");
+        let dir = RunDir::create(&base).unwrap();
+        dir.write("a.json", b"first").unwrap();
+        dir.write("a.json", b"second").unwrap();
+        assert_eq!(std::fs::read(dir.file("a.json")).unwrap(), b"second");
+        std::fs::create_dir_all(dir.file("folder/inside")).unwrap();
+        assert!(dir.write("folder", b"x").is_err(), "a folder is not replaced by a file");
+        assert_eq!(names(&base), ["a.json", "folder"]);
         std::fs::remove_dir_all(&base).unwrap();
     }
 }

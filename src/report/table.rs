@@ -1,9 +1,13 @@
-//! The tables at the end of a run, and what to make of them.
+//! The tables at the end of a run: aligned text, at most [`COLUMNS`] wide.
 
 use super::{Quantity, number};
 use crate::infer::draws::KernelStats;
 use std::fmt::Write;
 
+pub use super::warnings::warnings;
+
+/// Letters in a line of the tables of a run.
+pub const COLUMNS: usize = 100;
 /// Elements of one vector that are shown.
 const SHOWN: usize = 6;
 
@@ -40,7 +44,7 @@ pub fn quantities(quantities: &[Quantity]) -> String {
         let r_hat = if s.r_hat.is_nan() { "-".into() } else { format!("{:.3}", s.r_hat) };
         rows.push(vec![q.name.clone(), number(s.mean), number(s.sd), number(s.q05), number(s.q95), ess, r_hat]);
     }
-    let mut text = aligned(&rows);
+    let mut text = aligned(&narrowed(rows));
     if left_out > 0 {
         let _ = writeln!(text, "… and {left_out} more elements of vectors, in summary.json");
     }
@@ -58,50 +62,27 @@ pub fn kernels(kernels: &[KernelStats]) -> String {
         };
         rows.push(vec![k.name.clone(), k.proposals.to_string(), rate, k.failed.to_string(), super::seconds(k.seconds)]);
     }
-    aligned(&rows)
+    aligned(&narrowed(rows))
 }
 
-/// What a reader should know before believing the numbers.
-pub fn warnings(quantities: &[Quantity], kernels: &[KernelStats], chains: usize) -> Vec<String> {
-    let mut out = Vec::new();
-    let worst = |f: &dyn Fn(&Quantity) -> f64| {
-        let with = quantities.iter().map(|q| (f(q), q)).filter(|(x, _)| !x.is_nan());
-        with.max_by(|a, b| a.0.total_cmp(&b.0)).map(|(x, q)| (x, q.name.clone()))
-    };
-    if let Some((r, name)) = worst(&|q| q.summary.r_hat)
-        && r > 1.01
-    {
-        let what = if r > 1.1 { "the chains disagree" } else { "the chains may not have mixed" };
-        out.push(format!(
-            "{what}: R-hat of {name} is {r:.2} (1.01 or less is wanted); run longer with --time or --steps"
-        ));
-    }
-    if let Some((e, name)) = worst(&|q| -q.summary.ess_bulk)
-        && -e < 100.0 * chains as f64
-    {
-        out.push(format!("few independent draws: {:.0} of {name} ({} are wanted)", -e, 100 * chains));
-    }
-    for k in kernels.iter().filter(|k| k.proposals >= 200 && k.accepted == 0) {
-        out.push(format!("{} accepted none of {} proposals; it only costs time", k.name, k.proposals));
-    }
-    out
-}
-
-/// Adds up the kernels of several chains.
-pub fn merged<'a>(chains: impl IntoIterator<Item = &'a [KernelStats]>) -> Vec<KernelStats> {
-    let mut all: Vec<KernelStats> = Vec::new();
-    for k in chains.into_iter().flatten() {
-        match all.iter_mut().find(|a| a.name == k.name) {
-            Some(a) => {
-                a.proposals += k.proposals;
-                a.accepted += k.accepted;
-                a.failed += k.failed;
-                a.seconds += k.seconds;
-            }
-            None => all.push(k.clone()),
+/// Names (the first column) are cut in their middle until the lines fit, for their ends tell them apart.
+fn narrowed(mut rows: Vec<Vec<String>>) -> Vec<Vec<String>> {
+    let width = |rows: &[Vec<String>], c: usize| rows.iter().filter_map(|r| r.get(c)).map(|s| s.chars().count()).max();
+    let others: usize = (1..rows.first().map_or(0, Vec::len)).filter_map(|c| width(&rows, c)).map(|w| w + 2).sum();
+    let room = COLUMNS.saturating_sub(others).max(16);
+    for name in rows.iter_mut().filter_map(|r| r.first_mut()) {
+        let n = name.chars().count();
+        if n > room {
+            let (head, tail) = (room / 2, room - room / 2 - 1);
+            *name = name.chars().take(head).chain(['…']).chain(name.chars().skip(n - tail)).collect();
         }
     }
-    all
+    rows
+}
+
+/// Adds up the kernels of several chains by name, in order of first appearance.
+pub fn merged<'a>(chains: impl IntoIterator<Item = &'a [KernelStats]>) -> Vec<KernelStats> {
+    KernelStats::total(chains.into_iter().flatten())
 }
 
 #[cfg(test)]
@@ -122,6 +103,26 @@ mh(@x)                 200       50%       2  1.00 s
 drift(one(@**))          0         -       1  0.50 s
 ";
         assert_eq!(kernels(&all), expected);
-        assert!(warnings(&[], &[kernel("mh(@x)", 500, 0)], 2)[0].contains("none of 500"));
+    }
+
+    #[test]
+    fn long_names_are_cut_and_lines_fit() {
+        let chains = vec![vec![-1.234_567e-7, 1.0e9, 3.0, 4.0]; 2];
+        let of = |name: String| Quantity {
+            name,
+            column: Some(0),
+            summary: crate::infer::diagnostics::summary(&chains),
+            chains: chains.clone(),
+        };
+        let long = format!("{}/last[3]", "deep/".repeat(40));
+        let text = quantities(&[of(long), of("é".repeat(200))]);
+        assert!(text.lines().all(|l| l.chars().count() <= COLUMNS), "{text}");
+        assert!(
+            text.lines()
+                .nth(1)
+                .is_some_and(|l| l.starts_with("deep/deep/") && l.contains("…") && l.contains("/last[3] "))
+        );
+        let many: Vec<Quantity> = (0..9).map(|i| of(format!("v[{i}]"))).collect();
+        assert!(quantities(&many).ends_with("… and 3 more elements of vectors, in summary.json\n"));
     }
 }

@@ -1,0 +1,75 @@
+//! What a page holds as text: quoted text, pictures in base64 (RFC 4648), coordinates.
+
+const ALPHABET: &[u8; 64] = b"ABCDEFGHIJKLMNOPQRSTUVWXYZabcdefghijklmnopqrstuvwxyz0123456789+/";
+
+/// Base64 with padding.
+pub(super) fn base64(bytes: &[u8]) -> String {
+    let mut out = String::with_capacity(bytes.len().div_ceil(3) * 4);
+    for chunk in bytes.chunks(3) {
+        let at = |i: usize| u32::from(chunk.get(i).copied().unwrap_or(0));
+        let word = at(0) << 16 | at(1) << 8 | at(2);
+        for k in 0..4 {
+            let digit = ALPHABET[(word >> (18 - 6 * k) & 63) as usize];
+            out.push(if k > chunk.len() { '=' } else { char::from(digit) });
+        }
+    }
+    out
+}
+
+/// A text inside an element or a quoted attribute.
+pub(super) fn escaped(text: &str) -> String {
+    let mut out = String::with_capacity(text.len());
+    for c in text.chars() {
+        match c {
+            '&' => out.push_str("&amp;"),
+            '<' => out.push_str("&lt;"),
+            '>' => out.push_str("&gt;"),
+            '"' => out.push_str("&quot;"),
+            '\'' => out.push_str("&#39;"),
+            c => out.push(c),
+        }
+    }
+    out
+}
+
+/// Coordinates in a row, separated by commas, to a ten-thousandth of the largest: the page stays small, and every number
+/// is one in JSON.
+pub(super) fn coordinates(positions: &[[f32; 3]]) -> String {
+    let all = || positions.iter().flatten().map(|x| if x.is_finite() { f64::from(*x) } else { 0.0 });
+    let largest = all().fold(0.0, |m: f64, x| m.max(x.abs()));
+    // Four digits after the first of the largest number.
+    let digits = if largest > 0.0 { (4 - largest.log10().floor() as i32).clamp(0, 40) as usize } else { 0 };
+    let numbers = all().map(|x| {
+        let s = format!("{x:.digits$}");
+        let s = if s.contains('.') { s.trim_end_matches('0').trim_end_matches('.') } else { &s };
+        if s == "-0" { "0".to_owned() } else { s.to_owned() }
+    });
+    numbers.collect::<Vec<_>>().join(",")
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    #[test]
+    fn vectors_of_the_standard() {
+        for (text, code) in [("", ""), ("f", "Zg=="), ("fo", "Zm8="), ("foo", "Zm9v"), ("foobar", "Zm9vYmFy")] {
+            assert_eq!(base64(text.as_bytes()), code);
+        }
+        assert_eq!(base64(&[0xfb, 0xff, 0xfe]), "+//+");
+    }
+
+    #[test]
+    fn coordinates_keep_four_digits_of_the_largest() {
+        assert_eq!(coordinates(&[[1.234_567, -0.000_01, 0.5]]), "1.2346,0,0.5");
+        assert_eq!(coordinates(&[[123.456_7, f32::INFINITY, -7.0]]), "123.46,0,-7");
+        assert_eq!(coordinates(&[[1.234_567e-6, 0.0, -5e-7]]), "0.0000012346,0,-0.0000005");
+        assert_eq!(coordinates(&[[3e30, 1e-30, f32::NAN]]).split(',').count(), 3);
+        assert_eq!((coordinates(&[]), coordinates(&[[0.0; 3]])), (String::new(), "0,0,0".into()));
+    }
+
+    #[test]
+    fn quotes_are_escaped() {
+        assert_eq!(escaped("<a b=\"c\" d='e'> & é"), "&lt;a b=&quot;c&quot; d=&#39;e&#39;&gt; &amp; é");
+    }
+}

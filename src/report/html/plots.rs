@@ -1,0 +1,208 @@
+//! Small plots of draws as SVG: traces, distributions, ranks.
+//!
+//! Invariant: only finite numbers are written, whatever the draws are. Draws that are not finite are not shown.
+
+use crate::report::{Quantity, number};
+use std::fmt::Write;
+
+const WIDTH: f64 = 260.0;
+/// The height of the plot, and with the line of labels below it.
+const HEIGHT: f64 = 90.0;
+const WHOLE: f64 = 103.0;
+/// One colour for each chain, told apart also by the colour blind (Okabe and Ito 2008).
+const COLORS: [&str; 6] = ["#0072b2", "#d55e00", "#009e73", "#cc79a7", "#e69f00", "#56b4e9"];
+/// At most this many points of a chain are drawn.
+const POINTS: usize = 400;
+/// Bars of a distribution.
+const BINS: usize = 40;
+/// Bars of a histogram of ranks.
+const RANK_BINS: usize = 20;
+
+fn open(title: &str) -> String {
+    format!(
+        "<svg viewBox=\"0 0 {WIDTH} {WHOLE}\" width=\"{WIDTH}\" height=\"{WHOLE}\" role=\"img\"><title>{title}</title>\
+         <rect width=\"{WIDTH}\" height=\"{HEIGHT}\" fill=\"#fafafa\"/>"
+    )
+}
+
+/// A label below the plot, at its left or its right end.
+fn label(s: &mut String, right: bool, text: &str) {
+    let (x, anchor) = if right { (WIDTH, "end") } else { (0.0, "start") };
+    let _ = write!(s, "<text x=\"{x}\" y=\"{}\" text-anchor=\"{anchor}\">{text}</text>", WHOLE - 3.0);
+}
+
+/// The smallest and the largest finite draw.
+fn range(q: &Quantity) -> Option<(f64, f64)> {
+    let all = || q.chains.iter().flatten().copied().filter(|x| x.is_finite());
+    let (lo, hi) = (all().fold(f64::INFINITY, f64::min), all().fold(f64::NEG_INFINITY, f64::max));
+    (lo <= hi).then_some((lo, hi))
+}
+
+/// Where between the ends a draw is, from 0 to 1; in the middle if the ends are the same. Halves, so that the largest
+/// doubles do not overflow.
+fn place(x: f64, (lo, hi): (f64, f64)) -> f64 {
+    let share = (0.5 * x - 0.5 * lo) / (0.5 * hi - 0.5 * lo);
+    if share.is_finite() { share.clamp(0.0, 1.0) } else { 0.5 }
+}
+
+/// A line of level steps, one for each height in pixels from the top.
+fn steps(heights: &[f64]) -> String {
+    let width = WIDTH / heights.len().max(1) as f64;
+    let mut path = String::new();
+    for (i, y) in heights.iter().enumerate() {
+        let (x0, x1) = (width * i as f64, width * (i + 1) as f64);
+        let _ = write!(path, "{}{x0:.1},{y:.1}H{x1:.1}", if i == 0 { 'M' } else { 'L' });
+    }
+    path
+}
+
+fn color(chain: usize) -> &'static str {
+    COLORS[chain % COLORS.len()]
+}
+
+/// The draws of each chain in order; the labels are the smallest and the largest.
+pub(super) fn traces(q: &Quantity) -> String {
+    let mut s = open("draws in order, one line a chain");
+    if let Some(ends) = range(q) {
+        for (c, xs) in q.chains.iter().enumerate() {
+            let across = WIDTH / (xs.len().max(2) - 1) as f64;
+            let mut points = String::new();
+            for (i, x) in xs.iter().enumerate().step_by(xs.len().div_ceil(POINTS).max(1)).filter(|(_, x)| x.is_finite())
+            {
+                let _ =
+                    write!(points, "{:.1},{:.1} ", across * i as f64, HEIGHT - 2.0 - (HEIGHT - 4.0) * place(*x, ends));
+            }
+            let color = color(c);
+            let _ = write!(s, "<polyline points=\"{points}\" fill=\"none\" stroke=\"{color}\" stroke-width=\"0.8\"/>");
+        }
+        label(&mut s, false, &format!("{} to {}", number(ends.0), number(ends.1)));
+        label(&mut s, true, &format!("{} draws", q.chains.iter().map(Vec::len).max().unwrap_or(0)));
+    }
+    s + "</svg>"
+}
+
+/// The distribution of the draws of each chain; the labels are the ends of the axis.
+pub(super) fn marginal(q: &Quantity) -> String {
+    let mut s = open("distribution of the draws, one line a chain");
+    if let Some(ends) = range(q) {
+        let count = |xs: &Vec<f64>| {
+            let mut bins = [0.0f64; BINS];
+            for x in xs.iter().filter(|x| x.is_finite()) {
+                bins[((place(*x, ends) * BINS as f64) as usize).min(BINS - 1)] += 1.0 / xs.len() as f64;
+            }
+            bins
+        };
+        let all: Vec<_> = q.chains.iter().map(count).collect();
+        let top = all.iter().flatten().copied().fold(1e-9, f64::max);
+        for (c, bins) in all.iter().enumerate() {
+            let (path, color) = (steps(&bins.map(|b| HEIGHT - (HEIGHT - 4.0) * b / top)), color(c));
+            let _ = write!(
+                s,
+                "<path d=\"{path}V{HEIGHT}H0Z\" fill=\"{color}\" fill-opacity=\"0.15\" stroke=\"none\"/>\
+                 <path d=\"{path}\" fill=\"none\" stroke=\"{color}\"/>"
+            );
+        }
+        label(&mut s, false, &number(ends.0));
+        label(&mut s, true, &number(ends.1));
+    }
+    s + "</svg>"
+}
+
+/// How many of each chain's draws have ranks in each bin, relative to level; `[chain][bin]`. Equal draws share their
+/// ranks, so that chains that agree look alike for discrete quantities too.
+fn rank_shares(chains: &[Vec<f64>]) -> Vec<[f64; RANK_BINS]> {
+    let mut order: Vec<(f64, usize)> =
+        chains.iter().enumerate().flat_map(|(c, xs)| xs.iter().map(move |x| (*x + 0.0, c))).collect();
+    order.sort_by(|a, b| a.0.total_cmp(&b.0));
+    let scale = RANK_BINS as f64 / order.len().max(1) as f64;
+    let mut shares = vec![[0.0f64; RANK_BINS]; chains.len()];
+    let mut first = 0;
+    for equal in order.chunk_by(|a, b| a.0.total_cmp(&b.0).is_eq()) {
+        // The ranks of these draws, in bins.
+        let (from, to) = (first as f64 * scale, (first + equal.len()) as f64 * scale);
+        let mut own = vec![0.0; chains.len()];
+        equal.iter().for_each(|(_, c)| own[*c] += 1.0);
+        for bin in from as usize..(to.ceil() as usize).min(RANK_BINS) {
+            let overlap = (to.min(bin as f64 + 1.0) - from.max(bin as f64)).max(0.0) / (to - from);
+            for ((share, own), xs) in shares.iter_mut().zip(&own).zip(chains) {
+                share[bin] += own * overlap * RANK_BINS as f64 / xs.len().max(1) as f64;
+            }
+        }
+        first += equal.len();
+    }
+    shares
+}
+
+/// Histograms of the ranks of each chain's draws among all: level if the chains agree (Vehtari et al. 2021, section 4.3).
+pub(super) fn ranks(q: &Quantity) -> String {
+    let mut s = open("ranks of each chain's draws among all; level lines mean that the chains agree");
+    // Agreement is at a third of the height; what is beyond the top is cut.
+    let height = |share: f64| (HEIGHT - HEIGHT / 3.0 * share).max(2.0);
+    let level = height(1.0);
+    let _ = write!(s, "<path d=\"M0,{level:.1}H{WIDTH}\" stroke=\"#bbb\" stroke-dasharray=\"3 3\"/>");
+    for (c, shares) in rank_shares(&q.chains).iter().enumerate().filter(|(c, _)| !q.chains[*c].is_empty()) {
+        let _ = write!(s, "<path d=\"{}\" fill=\"none\" stroke=\"{}\"/>", steps(&shares.map(height)), color(c));
+    }
+    label(&mut s, false, "lowest rank");
+    label(&mut s, true, "highest");
+    s + "</svg>"
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+    use crate::infer::diagnostics::summary;
+
+    fn quantity(chains: Vec<Vec<f64>>) -> Quantity {
+        Quantity { name: "x".into(), column: None, summary: summary(&chains), chains }
+    }
+
+    #[test]
+    fn only_finite_numbers_are_written() {
+        let big = f64::MAX;
+        for chains in [
+            vec![vec![1.0, 2.0, f64::NAN, 4.0], vec![3.0, f64::INFINITY, f64::NEG_INFINITY, 2.5]],
+            vec![vec![2.0; 5]],
+            vec![vec![1e300; 5]],
+            vec![vec![-big, big], vec![0.0]],
+            vec![vec![f64::NAN; 3]],
+            vec![vec![]],
+            vec![],
+        ] {
+            let q = quantity(chains);
+            for svg in [traces(&q), marginal(&q), ranks(&q)] {
+                assert!(svg.starts_with("<svg") && svg.ends_with("</svg>"));
+                for data in svg.split("points=\"").skip(1).chain(svg.split(" d=\"").skip(1)) {
+                    let data = data.split('"').next().unwrap();
+                    assert!(!data.contains("NaN") && !data.contains("inf"), "{svg}");
+                }
+            }
+        }
+    }
+
+    #[test]
+    fn every_chain_is_drawn_within_the_plot() {
+        let q = quantity(vec![(0..1000).map(f64::from).collect(), vec![500.0; 10]]);
+        let svg = traces(&q);
+        let lines: Vec<&str> = svg.split("points=\"").skip(1).map(|l| l.split('"').next().unwrap()).collect();
+        assert_eq!(lines.iter().map(|l| l.split_whitespace().count()).collect::<Vec<_>>(), [334, 10]);
+        assert!(lines[0].starts_with("0.0,88.0 ") && lines[1].ends_with("260.0,45.0 "), "{svg}");
+        assert!(svg.contains(">0 to 999<") && svg.contains(">1000 draws<"));
+        assert_eq!(marginal(&q).matches("fill=\"none\"").count(), 2);
+    }
+
+    #[test]
+    fn ranks_are_level_where_chains_agree() {
+        let level = |shares: &[[f64; RANK_BINS]]| shares.iter().flatten().all(|s| (s - 1.0).abs() < 1e-9);
+        let half = |odd: usize| (0..200).map(|i| (2 * i + odd) as f64).collect::<Vec<_>>();
+        assert!(level(&rank_shares(&[half(0), half(1)])));
+        let coins = |n: usize| (0..n).map(|i| f64::from(i as u32 % 2)).collect::<Vec<_>>();
+        assert!(level(&rank_shares(&[coins(50), coins(50), coins(90)])), "equal draws share their ranks");
+        assert!(level(&rank_shares(&[vec![0.0, -0.0, 0.0], vec![-0.0; 3]])), "zeros are equal");
+        let apart = rank_shares(&[vec![1.0; 30], vec![2.0; 30]]);
+        assert_eq!((apart[0][0], apart[0][19], apart[1][0]), (2.0, 0.0, 0.0));
+        for chain in &apart {
+            assert!((chain.iter().sum::<f64>() - RANK_BINS as f64).abs() < 1e-9);
+        }
+    }
+}

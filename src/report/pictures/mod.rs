@@ -1,0 +1,61 @@
+//! Pictures of draws, from plain buffers: over the photograph, on their own, and many on one sheet.
+//!
+//! Nothing here renders a scene; it colours what was rendered. Rows go down, pixel (0, 0) is the upper left one, and its
+//! middle is at (0.5, 0.5). Buffers that are too short count as background, so no input panics.
+
+mod font;
+mod sheet;
+mod strokes;
+mod surface;
+
+pub use sheet::{captioned_sheet, contact_sheet};
+pub use strokes::{Strokes, contours};
+pub use surface::{Drawn, frequency, mask, overlay, shaded};
+
+/// Pictures are enlarged until their longer side has this many pixels.
+pub const LONGER_SIDE: u32 = 768;
+
+/// The size of pictures of a photograph of some size: at least [`LONGER_SIDE`] along the longer side.
+pub fn picture_size(width: u32, height: u32) -> (u32, u32) {
+    let longer = width.max(height).max(1);
+    if longer >= LONGER_SIDE {
+        return (width, height);
+    }
+    let scale = |x: u32| (u64::from(x) * u64::from(LONGER_SIDE) / u64::from(longer)).max(1) as u32;
+    (scale(width), scale(height))
+}
+
+/// The bytes of a PNG file.
+///
+/// # Errors
+/// If the picture has no pixels.
+pub fn png<P>(picture: &image::ImageBuffer<P, Vec<u8>>) -> Result<Vec<u8>, image::ImageError>
+where
+    P: image::Pixel<Subpixel = u8> + image::PixelWithColorType,
+{
+    let mut bytes = Vec::new();
+    picture.write_to(&mut std::io::Cursor::new(&mut bytes), image::ImageFormat::Png)?;
+    Ok(bytes)
+}
+
+/// One colour over another.
+fn mix(under: [u8; 3], over: [f32; 3], share: f32) -> [u8; 3] {
+    [0, 1, 2].map(|c| (f32::from(under[c]) * (1.0 - share) + over[c].clamp(0.0, 255.0) * share).round() as u8)
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    #[test]
+    fn sizes_and_files() {
+        assert_eq!(picture_size(256, 128), (768, 384));
+        assert_eq!(picture_size(4000, 10), (4000, 10));
+        assert_eq!(picture_size(1, 100_000), (1, 100_000));
+        assert_eq!(picture_size(0, 0), (1, 1));
+        let picture = image::RgbImage::from_fn(5, 3, |x, y| image::Rgb([x as u8, y as u8, 7]));
+        let back = image::load_from_memory(&png(&picture).unwrap()).unwrap().to_rgb8();
+        assert_eq!(back, picture);
+        assert_eq!(mix([0, 100, 200], [100.0, 100.0, 300.0], 0.5), [50, 100, 228]);
+    }
+}

@@ -1,0 +1,125 @@
+//! What a reader should know before believing the numbers of a run, and what to do about it.
+//!
+//! Thresholds are those of Vehtari, Gelman, Simpson, Carpenter & Bürkner (2021): R-hat of at most 1.01 and 100 effective
+//! draws a chain.
+
+use super::Quantity;
+use crate::infer::draws::KernelStats;
+
+/// Proposals before a kernel is judged.
+const JUDGED: u64 = 200;
+/// Draws of a chain before it counts as stuck.
+const STUCK: usize = 50;
+
+/// Sentences for the user, the gravest first; none if all is well. `chains` is the number of chains that were run.
+pub fn warnings(quantities: &[Quantity], kernels: &[KernelStats], chains: usize) -> Vec<String> {
+    let mut out = Vec::new();
+    if let Some(q) = quantities.iter().find(|q| is_stuck(q)) {
+        out.push(format!(
+            "the chains disagree: {} never moved in any chain, and the chains are at different values; give it a kernel \
+             that reaches it, or smaller steps",
+            q.name
+        ));
+    }
+    if let Some((r, name)) = worst(quantities, |q| q.summary.r_hat).filter(|(r, _)| *r > 1.01) {
+        let what = if r > 1.1 { "the chains disagree" } else { "the chains may not have mixed" };
+        out.push(format!(
+            "{what}: R-hat of {name} is {r:.2} (1.01 or less is wanted); run longer with --time or --steps"
+        ));
+    }
+    let wanted = 100 * chains;
+    if let Some((e, name)) = worst(quantities, |q| -q.summary.ess_bulk).filter(|(e, _)| -e < wanted as f64) {
+        let e = -e;
+        out.push(format!(
+            "few independent draws: {e:.0} of {name} ({wanted} are wanted); run longer with --time or --steps"
+        ));
+    }
+    if quantities.first().is_some_and(|q| q.chains.iter().map(Vec::len).sum::<usize>() > 0 && too_short(q)) {
+        out.push("too few draws to judge the chains: at least 4 a chain are needed; run longer".into());
+    }
+    for k in kernels.iter().filter(|k| k.proposals >= JUDGED) {
+        if 2 * k.failed > k.proposals {
+            out.push(format!(
+                "{}: {} of {} proposals led where the program has no value (a scale that is not positive, say); \
+                 narrow the prior, or take smaller steps",
+                k.name, k.failed, k.proposals
+            ));
+        } else if k.accepted == 0 {
+            out.push(format!("{} accepted none of {} proposals; it only costs time", k.name, k.proposals));
+        }
+    }
+    out
+}
+
+/// The largest value of `f` that is a number, and the quantity it is of.
+fn worst(quantities: &[Quantity], f: impl Fn(&Quantity) -> f64) -> Option<(f64, &str)> {
+    let known = quantities.iter().map(|q| (f(q), &*q.name)).filter(|(x, _)| !x.is_nan());
+    known.max_by(|a, b| a.0.total_cmp(&b.0))
+}
+
+/// Whether each chain stays where it is, and not all at one place. R-hat has no value then.
+fn is_stuck(q: &Quantity) -> bool {
+    let same = |xs: &[f64]| xs.windows(2).all(|w| w[0].to_bits() == w[1].to_bits());
+    let firsts: Vec<f64> = q.chains.iter().filter_map(|c| c.first().copied()).collect();
+    q.chains.iter().all(|c| c.len() >= STUCK && same(c)) && !same(&firsts)
+}
+
+/// Whether no chain is long enough to be split and compared.
+fn too_short(q: &Quantity) -> bool {
+    q.chains.iter().any(|c| c.len() < 4)
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+    use crate::infer::diagnostics::summary;
+
+    fn quantity(name: &str, chains: Vec<Vec<f64>>) -> Quantity {
+        Quantity { name: name.into(), column: None, summary: summary(&chains), chains }
+    }
+
+    /// Numbers without any order to them, between 0 and 1.
+    fn noise(seed: u64, n: u64) -> Vec<f64> {
+        (0..n).map(|i| (((i + 1) * (i + seed) * 2_654_435_761) % 1_000_003) as f64 / 1_000_003.0).collect()
+    }
+
+    fn kernel(proposals: u64, accepted: u64, failed: u64) -> KernelStats {
+        KernelStats { name: "mh(@x)".into(), proposals, accepted, seconds: 0.1, failed }
+    }
+
+    #[test]
+    fn a_good_run_has_none() {
+        let q = quantity("x", (0..4).map(|c| noise(c * 977 + 13, 2000)).collect());
+        assert!(q.summary.r_hat < 1.01 && q.summary.ess_bulk > 400.0, "{:?}", q.summary);
+        assert_eq!(warnings(&[q], &[kernel(1000, 300, 10), kernel(0, 0, 0)], 4), [""; 0]);
+    }
+
+    #[test]
+    fn disagreement_is_said_with_the_worst_quantity() {
+        let apart = |by: f64| (0..2).map(|c| noise(c + 13, 500).iter().map(|x| x + by * c as f64).collect()).collect();
+        let w = warnings(&[quantity("near", apart(0.2)), quantity("far", apart(5.0))], &[], 2);
+        assert!(w[0].starts_with("the chains disagree: R-hat of far is"), "{w:?}");
+        assert!(w[1].starts_with("few independent draws: ") && w[1].contains("of far (200 are wanted)"), "{w:?}");
+    }
+
+    #[test]
+    fn stuck_chains_are_told_from_constants() {
+        let constant = quantity("c", vec![vec![1.0; 100]; 2]);
+        assert_eq!(warnings(&[constant], &[], 0), [""; 0]);
+        let stuck = quantity("s", vec![vec![1.0; 100], vec![2.0; 100]]);
+        assert!(warnings(&[stuck], &[], 0)[0].contains("s never moved"));
+    }
+
+    #[test]
+    fn kernels_that_do_nothing_and_short_runs() {
+        assert!(warnings(&[], &[kernel(500, 0, 0)], 2)[0].contains("none of 500"));
+        assert!(warnings(&[], &[kernel(500, 0, 400)], 2)[0].contains("400 of 500"));
+        assert_eq!(warnings(&[], &[kernel(100, 0, 100)], 2), [""; 0], "too few to judge");
+        assert!(warnings(&[quantity("x", vec![vec![1.0, 2.0]])], &[], 1)[0].starts_with("too few draws"));
+        assert_eq!(
+            warnings(&[quantity("x", vec![vec![]])], &[], 1),
+            [""; 0],
+            "a run without draws has nothing to judge"
+        );
+    }
+}
