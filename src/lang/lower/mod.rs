@@ -4,9 +4,9 @@
 //! functions, which see every top-level name, then the inference blocks, which see all that came before. Nothing is
 //! evaluated here but the defaults of `param` and `data` given by the host.
 //!
-//! One file a concern: [`scope`] names and sites, [`items`] the top level, [`stmt`] statements, [`draw`] random choices and
-//! containers, [`expr`] expressions, [`call`] calls, [`plan`] inference blocks, [`select`] selections, [`types`] what can be
-//! told of types, [`hints`] what to say of unknown names.
+//! One file a concern: `scope` names and sites, `items` the top level, `stmt` statements, `draw` random choices and
+//! containers, `expr` expressions, `call` calls, `plan` inference blocks, `select` selections, `types` what can be
+//! told of types, `hints` what to say of unknown names.
 
 mod call;
 mod draw;
