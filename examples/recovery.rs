@@ -1,7 +1,7 @@
 //! Known truth: scenes drawn from the prior of `lathe.pcad`, their own clean contours as the observation. How well are pose and
 //! profile recovered, and how often do 90 % intervals hold the truth?
 //!
-//! `cargo run --release --example recovery -- [CASES] [SECONDS]`
+//! `cargo run --release --example recovery -- [CASES] [SECONDS] [PARAMETER=VALUE…]`
 
 use pcadlang::lang::builtins::scene::{ImageValue, ViewValue};
 use pcadlang::lang::load::embedded;
@@ -19,10 +19,16 @@ const SIZE: u32 = 256;
 
 fn compile(map: ContourMap) -> Result<Model, pcadlang::Error> {
     let image = Value::object(ImageValue::contours(map, None));
-    Program::parse(embedded("lathe.pcad").unwrap_or_default())?
+    let program = Program::parse(embedded("lathe.pcad").unwrap_or_default())?
         .observe("photo", image)
         .camera(Camera::default_for(SIZE, SIZE))
-        .compile()
+        .set("clean", "true");
+    let settings: Vec<String> = std::env::args().skip(3).collect();
+    let set = |p: Program, s: &String| match s.split_once('=') {
+        Some((name, value)) => p.set(name, value),
+        None => p,
+    };
+    settings.iter().fold(program, set).compile()
 }
 
 /// A scene from the prior that lies within the picture: its trace and contours.

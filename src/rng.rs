@@ -21,6 +21,8 @@ impl Purpose {
     pub const PREDICT: Purpose = Purpose(4);
     /// Which kernel of a mixture is next.
     pub const MIX: Purpose = Purpose(5);
+    /// Which members of a population go on.
+    pub const POPULATION: Purpose = Purpose(6);
 }
 
 /// The part of a stream's identity that stays the same through a run.

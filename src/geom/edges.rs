@@ -58,7 +58,7 @@ pub(super) fn build(positions: &[Vec3], triangles: &[[u32; 3]], parts: &[u16]) -
         .map(|(f, c, g, crease)| Edge { vertices: [out[f][c], out[f][(c + 1) % 3]], faces: [f as u32, g], crease })
         .collect();
     let part_count = kept_parts.iter().max().map_or(0, |p| p.saturating_add(1));
-    let topology = Topology { triangles: out, parts: kept_parts, part_count, edges };
+    let topology = Topology { triangles: out, parts: kept_parts, part_count, edges, encloses: false };
     Some(Mesh { positions: out_positions, normals: out_normals, topology: Arc::new(topology) })
 }
 

@@ -33,6 +33,9 @@ pub struct Topology {
     pub part_count: u16,
     /// Every edge once.
     pub edges: Vec<Edge>,
+    /// Whether the faces are known to enclose a body without crossing each other: seen from outside, those that are turned
+    /// away are hidden by others and need not be drawn. Meshes from files make no such promise.
+    pub encloses: bool,
 }
 
 /// A triangle mesh.

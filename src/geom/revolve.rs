@@ -6,7 +6,7 @@
 //! Invariant: the mesh is the same whether its topology was found in the cache or not.
 
 use super::edges::pair_edges;
-use super::{Edge, Mesh, Topology};
+use super::{Edge, Mesh, NO_FACE, Topology};
 use glam::Vec3;
 use std::cell::RefCell;
 use std::sync::Arc;
@@ -28,16 +28,20 @@ struct Signature {
     sides: u32,
     closed: bool,
     part_count: u16,
+    /// Whether the path never turns down: it cannot cross itself then.
+    rising: bool,
     /// For each strip: points, poles and blend; then the parts of its segments.
     strips: Vec<u32>,
 }
 
 /// Sweeps strips, each beginning where the one before ends; `closed` joins the last to the first.
 pub(super) fn revolve(strips: &[Strip], sides: u32, closed: bool, part_count: u16) -> Mesh {
-    let signature = signature(strips, sides, closed, part_count);
-    let Shared { topology, circle } = cached(signature, || Shared {
-        topology: Arc::new(topology(strips, sides, closed, part_count)),
-        circle: circle(sides),
+    let rising = strips.iter().flat_map(|s| &s.points).is_sorted_by(|a, b| a.1 <= b.1);
+    let signature = signature(strips, sides, closed, part_count, rising);
+    let Shared { topology, circle } = cached(signature, || {
+        let mut topology = topology(strips, sides, closed, part_count);
+        topology.encloses = rising && topology.edges.iter().all(|e| e.faces[1] != NO_FACE);
+        Shared { topology: Arc::new(topology), circle: circle(sides) }
     });
     let n = sides as usize;
     let count: usize = strips.iter().map(|s| s.points.len() * n).sum();
@@ -70,7 +74,7 @@ fn circle(sides: u32) -> Arc<[(f64, f64)]> {
     (0..sides).map(|k| (libm::cos(angle(k)), libm::sin(angle(k)))).collect()
 }
 
-fn signature(strips: &[Strip], sides: u32, closed: bool, part_count: u16) -> Signature {
+fn signature(strips: &[Strip], sides: u32, closed: bool, part_count: u16, rising: bool) -> Signature {
     let mut numbers = Vec::with_capacity(strips.iter().map(|s| s.parts.len() + 2).sum());
     for s in strips {
         let pole = |p: Option<&(f64, f64)>| u32::from(p.is_some_and(|p| p.0 == 0.0));
@@ -78,7 +82,7 @@ fn signature(strips: &[Strip], sides: u32, closed: bool, part_count: u16) -> Sig
         numbers.extend([s.points.len() as u32, flags]);
         numbers.extend(s.parts.iter().map(|p| u32::from(*p)));
     }
-    Signature { sides, closed, part_count, strips: numbers }
+    Signature { sides, closed, part_count, rising, strips: numbers }
 }
 
 /// What surfaces of one signature have in common.
@@ -183,5 +187,5 @@ fn topology(strips: &[Strip], sides: u32, closed: bool, part_count: u16) -> Topo
             crease,
         })
         .collect();
-    Topology { triangles, parts, part_count, edges }
+    Topology { triangles, parts, part_count, edges, encloses: false }
 }

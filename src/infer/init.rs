@@ -1,21 +1,33 @@
 //! Starts: traces of positive probability, and what to say when there is none.
 
+use super::expr::{Scope, evaluate};
+use super::plan::{ChainError, RunOptions, argument, call};
+use super::selection::fail;
 use crate::lang::address::Address;
 use crate::lang::code::Code;
 use crate::lang::error::RunError;
+use crate::lang::value::Value;
 use crate::rng::{Purpose, StreamKey};
+use crate::syntax::ast::{Expr, KStmt, KStmtKind};
 use crate::syntax::span::Span;
 use crate::trace::{Draws, Limits, Trace};
 use std::fmt;
 use std::sync::Arc;
+use std::time::Instant;
 
-/// How a chain starts.
+/// How a chain starts: with the best of so many draws from the prior, by log joint density.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
-pub enum Start {
-    /// One draw from the prior.
-    Prior,
-    /// The best of so many, by log joint density.
-    BestOf(u64),
+pub struct Start {
+    /// Draws of positive probability that are tried.
+    pub draws: u64,
+    /// How many of the best are kept: more than one begin a population (see [`super::Population`]).
+    pub keep: usize,
+}
+
+impl Default for Start {
+    fn default() -> Self {
+        Start { draws: 1, keep: 1 }
+    }
 }
 
 /// How often a draw from the prior may have no probability before that is an error.
@@ -52,45 +64,39 @@ impl fmt::Display for NoStart {
     }
 }
 
-/// Starts a chain.
+/// The traces a chain starts with, the best first: as many as are to be kept, or fewer if fewer draws succeed.
 ///
 /// # Errors
 /// If the program fails, or if no draw has positive probability within the bounded retries.
-pub fn start(code: &Arc<Code>, seed: u64, chain: u32, how: Start, limits: Limits) -> Result<Trace, StartError> {
-    let wanted = match how {
-        Start::Prior => 1,
-        Start::BestOf(n) => n.max(1),
-    };
+pub fn starts(code: &Arc<Code>, seed: u64, chain: u32, how: Start, limits: Limits) -> Result<Vec<Trace>, StartError> {
     let key = StreamKey::new(seed, chain, Purpose::START);
-    let mut best: Option<Trace> = None;
+    let mut best: Vec<Trace> = Vec::new();
     let mut found = 0;
     let mut last = None;
-    for attempt in 0..wanted + RETRIES {
+    for attempt in 0..how.draws + RETRIES {
         match Trace::simulate(Arc::clone(code), Draws { key, step: attempt, lane: 0 }, limits) {
-            Ok(t) => {
-                let log_joint = t.log_joint();
-                if log_joint > f64::NEG_INFINITY {
-                    found += 1;
-                    if best.as_ref().is_none_or(|b| log_joint > b.log_joint()) {
-                        best = Some(t);
-                    }
-                } else {
-                    last = Some(Ok(t));
+            Ok(t) if t.log_joint() > f64::NEG_INFINITY => {
+                found += 1;
+                let place = best.partition_point(|b| b.log_joint() >= t.log_joint());
+                if place < how.keep.max(1) {
+                    best.insert(place, t);
+                    best.truncate(how.keep.max(1));
                 }
             }
+            Ok(t) => last = Some(Ok(t)),
             Err(e) if e.is_recoverable() => last = Some(Err(e)),
             Err(e) => return Err(StartError::Run(e)),
         }
         // Failures cost attempts too, once there is something to start from.
-        if found >= wanted || (found > 0 && attempt + 1 >= wanted) {
+        if found >= how.draws || (found > 0 && attempt + 1 >= how.draws) {
             break;
         }
     }
-    match (best, last) {
-        (Some(t), _) => Ok(t),
-        (None, Some(Ok(t))) => Err(StartError::Impossible(explain(&t))),
-        (None, Some(Err(e))) => Err(StartError::Run(e)),
-        (None, None) => Err(StartError::Impossible(NoStart::default())),
+    match last {
+        _ if !best.is_empty() => Ok(best),
+        Some(Ok(t)) => Err(StartError::Impossible(explain(&t))),
+        Some(Err(e)) => Err(StartError::Run(e)),
+        None => Err(StartError::Impossible(NoStart::default())),
     }
 }
 
@@ -98,4 +104,33 @@ pub fn start(code: &Arc<Code>, seed: u64, chain: u32, how: Start, limits: Limits
 fn explain(t: &Trace) -> NoStart {
     let zero = t.impossible().into_iter().map(|(address, span)| ZeroTerm { address, span });
     NoStart { terms: zero.collect() }
+}
+
+/// What the `init` statement of a plan asks for.
+pub(crate) fn start_of(code: &Arc<Code>, plan: &[KStmt], options: &RunOptions) -> Result<Start, ChainError> {
+    let init = plan.iter().find_map(|s| match &s.kind {
+        KStmtKind::Expr(e) => call(e).filter(|(name, _)| *name == "init").map(|(_, args)| (e, args)),
+        _ => None,
+    });
+    let Some((e, args)) = init else { return Ok(Start::default()) };
+    let wrong = || ChainError::Run(fail(e.span, "init takes prior() or best_of(n)".into()));
+    let [how] = args else { return Err(wrong()) };
+    let mut trace = Trace::prior(Arc::clone(code), options.limits);
+    let mut count = |e: &Expr| -> Result<u64, ChainError> {
+        let (draws, started) = (Draws::default(), Instant::now());
+        let mut env = Scope { code, trace: &mut trace, variables: &[], draws, started, steps: 0 };
+        match evaluate(e, &mut env)? {
+            Value::Num(x) if x >= 1.0 => Ok(x as u64),
+            v => Err(ChainError::Run(fail(e.span, format!("a number of draws was expected, got {v}")))),
+        }
+    };
+    match call(&how.value) {
+        Some(("prior", [])) => Ok(Start::default()),
+        Some(("best_of", args)) => {
+            let draws = argument(args, 0, "n").map_or(Err(wrong()), &mut count)?;
+            let keep = argument(args, 1, "keep").map_or(Ok(1), &mut count)?;
+            Ok(Start { draws, keep: keep.min(draws) as usize })
+        }
+        _ => Err(wrong()),
+    }
 }

@@ -10,12 +10,13 @@ mod init;
 mod kernel;
 mod kernels;
 mod plan;
+mod population;
 mod record;
 mod selection;
 
 pub use chains::run_chains;
 pub use default_plan::default_plan;
-pub use init::{Start, StartError, start};
+pub use init::{Start, StartError, starts};
 pub use kernel::{At, Kernel, Outcome, Scope};
 pub use kernels::{Block, Drift, Elliptical, Gibbs, Mh};
 pub use plan::{ChainError, ChainResult, Progress, RunOptions};

@@ -41,7 +41,7 @@ thread_local! {
 }
 
 impl Frame {
-    /// Draws a solid. Back faces are drawn too; triangles with a vertex that is not finite are left out.
+    /// Draws a solid. Back faces are drawn too, but for bodies that hide their own; triangles with a vertex that is not finite are left out.
     pub fn render(solid: &Solid, camera: &Camera, channels: Channels) -> Frame {
         POINTS.with(|points| match points.try_borrow_mut() {
             Ok(mut points) => Frame::draw(solid, camera, channels, &mut points),

@@ -259,3 +259,33 @@ fn random_poses_never_panic() {
         assert!(frame.normal.iter().flatten().all(|v| v.is_finite()));
     }
 }
+
+/// Bodies that hide their own backs are drawn without them; nothing else may come of it.
+#[test]
+fn a_body_without_its_backs_looks_the_same() {
+    use crate::geom::{Caps, Profile, lathe, sphere};
+    let profile = |y: &[f64], r: &[f64]| Profile { y: y.to_vec(), r: r.to_vec() };
+    let parts = [profile(&[-1.0, -0.2, 0.3], &[0.3, 0.9, 0.2]), profile(&[0.3, 0.9], &[0.6, 0.4])];
+    let bodies = [lathe(&parts, 24, 0.0, Caps::Both).unwrap(), sphere(0.8, 20).unwrap()];
+    assert!(bodies.iter().all(|m| m.topology.encloses));
+    assert!(!lathe(&parts, 24, 0.0, Caps::Bottom).unwrap().topology.encloses, "its inside can be seen");
+    assert!(!lathe(&parts, 24, 0.05, Caps::Bottom).unwrap().topology.encloses, "its walls may cross");
+    let mut random = Uniform(8);
+    let (camera, mut drawn) = (Camera::default_for(60, 50), 0);
+    for round in 0..200 {
+        let mut place = |s: f64| DVec3::new(random.between(-s, s), random.between(-s, s), random.between(-s, s));
+        let (at, turn, scale) = (place(1.0), place(3.0), place(1.5));
+        // Some stand across the near plane or round the eye.
+        let at = if round % 5 == 0 { camera.eye + at } else { at };
+        let mesh = &bodies[round % 2];
+        let mut plain = mesh.clone();
+        Arc::make_mut(&mut plain.topology).encloses = false;
+        let [fast, plain] = [mesh.clone(), plain]
+            .map(|m| render(&Solid::new(Arc::new(m)).placed(Affine::new(at, turn, scale)), &camera));
+        for (i, (a, b)) in fast.depth.iter().zip(&plain.depth).enumerate() {
+            assert!(a == b || (a - b).abs() < 1e-5 * b, "round {round}, pixel {i}: {a} {b}");
+            drawn += usize::from(a.is_finite());
+        }
+    }
+    assert!(drawn > 20_000, "{drawn}");
+}

@@ -126,11 +126,16 @@ pub(super) fn each_triangle(
         let count = item.mesh.positions.len();
         let Some(points) = points.get(base..base + count) else { return };
         base += count;
+        // With the eye outside, the faces of a body that are turned away are hidden by others.
+        let fronts_only = item.mesh.topology.encloses && points.iter().all(|p| p.depth >= Camera::NEAR);
         for (face, &[i, j, k]) in item.mesh.topology.triangles.iter().enumerate() {
             let (Some(a), Some(b), Some(c)) = (points.get(i as usize), points.get(j as usize), points.get(k as usize))
             else {
                 continue;
             };
+            if fronts_only && turned_away(a, b, c, placement.mirrored) {
+                continue;
+            }
             if a.depth >= Camera::NEAR && b.depth >= Camera::NEAR && c.depth >= Camera::NEAR {
                 if let Some(triangle) = Triangle::new([*a, *b, *c], width, height) {
                     draw(&triangle, &Source { instance, face, placement: &placement, weights: WHOLE });
@@ -155,6 +160,14 @@ pub(super) fn each_triangle(
             }
         }
     }
+}
+
+/// Whether a triangle shows its back, or nothing. Counter-clockwise in the scene is clockwise in numbers of the image, whose y
+/// runs down.
+#[inline]
+fn turned_away(a: &Point, b: &Point, c: &Point, mirrored: bool) -> bool {
+    let area = (b.x - a.x) * (c.y - a.y) - (b.y - a.y) * (c.x - a.x);
+    if mirrored { area <= 0.0 } else { area >= 0.0 }
 }
 
 /// The part of a triangle beyond the near plane as a polygon of at most four corners, each as weights.

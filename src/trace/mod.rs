@@ -150,6 +150,26 @@ impl Trace {
         self.graph.removed.iter().any(|(n, _, _)| *n == t.node)
     }
 
+    /// Goes over to a saved state (see [`Trace::constraints`]); selections stay valid.
+    ///
+    /// # Errors
+    /// As [`Trace::propose`].
+    pub fn restore(&mut self, saved: &[(u64, Constraint)], draws: Draws) -> TraceResult<()> {
+        self.rollback();
+        let values: rustc_hash::FxHashMap<u64, &Constraint> = saved.iter().map(|(h, c)| (*h, c)).collect();
+        let here = self.graph.choices.selections[0].targets();
+        let changes: Vec<_> = here
+            .iter()
+            .filter_map(|t| match values.get(&self.address_hash(*t)) {
+                Some(Constraint::Stored(d)) => Some((*t, Change::Set(d.clone()))),
+                _ => None,
+            })
+            .collect();
+        self.propose_constrained(&changes, saved, draws)?;
+        self.commit();
+        Ok(())
+    }
+
     /// Keeps the pending proposal, if there is one.
     pub fn commit(&mut self) {
         if self.update.take().is_some() {

@@ -181,13 +181,22 @@ pub(super) const TABLE: &[Builtin] = &[
         CHOICES,
         &[arg("from", Type::Num, "The temperature at the start, at least 1.")],
         Type::Kernel,
-        "In `warmup` only: raises the power of the likelihood from `1 / from` to 1 over the warm-up.",
+        "In `warmup` only: raises the power of the likelihood from `1 / from` to 1 over the warm-up. With several starts kept, \
+         population annealing: they move in turn, and the likelier have more offspring.",
     ),
     name("prior", CHOICES, &[], Type::Kernel, "A start drawn from the prior."),
     name(
         "best_of",
         CHOICES,
-        &[arg("n", Type::Int, "How many draws from the prior.")],
+        &[
+            arg("n", Type::Int, "How many draws from the prior."),
+            opt(
+                "keep",
+                Type::Int,
+                "1",
+                "How many of the best begin a population that `anneal` thins out to one state.",
+            ),
+        ],
         Type::Kernel,
         "A start: the draw from the prior with the highest log joint density.",
     ),

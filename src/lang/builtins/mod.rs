@@ -11,6 +11,7 @@ pub mod doc;
 mod elementwise;
 mod forms;
 mod inference;
+mod interp;
 mod list;
 mod math;
 mod matrix;

@@ -2,7 +2,9 @@
 //!
 //! Not a scope: shadowing by a program's own names is the business of lowering.
 
-use super::{Builtin, covariance, data, distributions, forms, inference, list, math, matrix, operators, reduce, scene};
+use super::{
+    Builtin, covariance, data, distributions, forms, inference, interp, list, math, matrix, operators, reduce, scene,
+};
 use indexmap::IndexMap;
 use rustc_hash::FxBuildHasher;
 
@@ -29,6 +31,7 @@ pub(super) fn all() -> impl Iterator<Item = Builtin> {
         math::TABLE,
         reduce::TABLE,
         list::TABLE,
+        interp::TABLE,
         matrix::TABLE,
         distributions::TABLE,
         covariance::TABLE,

@@ -93,3 +93,17 @@ fn values_become_text() {
     same(call("str", &["a".into()]), "a".into());
     same(call("str", &[arr(&[1.0, 2.0])]), "[1, 2]".into());
 }
+
+#[test]
+fn tables_are_read_along_straight_lines() {
+    let (xs, ys) = (arr(&[0.0, 1.0, 3.0]), arr(&[10.0, 20.0, 0.0]));
+    let at = |x: f64| call("interp", &[num(x), xs.clone(), ys.clone()]);
+    for (x, y) in [(-5.0, 10.0), (0.0, 10.0), (0.5, 15.0), (1.0, 20.0), (2.0, 10.0), (3.0, 0.0), (9.0, 0.0)] {
+        same(at(x), num(y));
+    }
+    same(call("interp", &[arr(&[0.5, 2.5]), xs.clone(), ys.clone()]), arr(&[15.0, 5.0]));
+    same(call("interp", &[num(1.0), arr(&[1.0, 1.0]), arr(&[2.0, 3.0])]), num(3.0));
+    assert_eq!(fails("interp", &[num(0.0), arr(&[1.0, 0.0]), arr(&[0.0, 0.0])]), "interp: the places `xs` must ascend");
+    assert!(fails("interp", &[num(0.0), xs.clone(), arr(&[0.0])]).contains("3 numbers, as many"));
+    assert!(fails("interp", &[num(0.0), arr(&[]), arr(&[])]).contains("interp"));
+}

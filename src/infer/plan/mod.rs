@@ -1,10 +1,13 @@
 //! Running an inference block: one chain, statement by statement.
 
+mod warmup;
+
 use super::draws::{DrawRow, KernelStats, Sink};
 use super::expr::{Scope, evaluate};
-use super::init::{Start, StartError, start};
+use super::init::{StartError, start_of, starts};
 use super::kernel::{At, Kernel};
 use super::kernels::{Block, Drift, Elliptical, Gibbs, Mh};
+use super::population::Population;
 use super::record::Recorder;
 use super::selection::{fail, scope, selector};
 use crate::lang::code::Code;
@@ -123,6 +126,7 @@ pub(crate) struct Runner<'a> {
     in_warmup: bool,
     loops: u32,
     power: f64,
+    population: Population,
     best: Option<(f64, Vec<(u64, Constraint)>)>,
     draws: u64,
 }
@@ -141,7 +145,12 @@ pub(crate) fn run_chain(
 ) -> Result<ChainResult, ChainError> {
     let started = Instant::now();
     let how = start_of(code, plan, options)?;
-    let mut trace = start(code, options.seed, chain, how, options.limits).map_err(ChainError::Start)?;
+    let mut begun = starts(code, options.seed, chain, how, options.limits).map_err(ChainError::Start)?;
+    for trace in &mut begun {
+        super::force::apply(code, trace, options, chain)?;
+    }
+    let population = Population::new(&begun);
+    let mut trace = begun.swap_remove(0);
     trace.set_incremental(options.incremental);
     let mut runner = Runner {
         code,
@@ -160,10 +169,11 @@ pub(crate) fn run_chain(
         in_warmup: false,
         loops: 0,
         power: 1.0,
+        population,
         best: None,
         draws: 0,
     };
-    runner.force_and_freeze()?;
+    runner.freeze()?;
     runner.body(plan)?;
     if runner.draws == 0 {
         runner.record(None)?;
@@ -182,38 +192,8 @@ pub(crate) fn run_chain(
     })
 }
 
-/// What the `init` statement of a plan asks for.
-fn start_of(code: &Arc<Code>, plan: &[KStmt], options: &RunOptions) -> Result<Start, ChainError> {
-    let init = plan.iter().find_map(|s| match &s.kind {
-        KStmtKind::Expr(e) => call(e).filter(|(name, _)| *name == "init").map(|(_, args)| (e, args)),
-        _ => None,
-    });
-    let Some((e, args)) = init else { return Ok(Start::Prior) };
-    let wrong = || ChainError::Run(fail(e.span, "init takes prior() or best_of(n)".into()));
-    let [how] = args else { return Err(wrong()) };
-    match call(&how.value) {
-        Some(("prior", [])) => Ok(Start::Prior),
-        Some(("best_of", [n])) => {
-            let mut trace = Trace::prior(Arc::clone(code), options.limits);
-            let mut env = Scope {
-                code,
-                trace: &mut trace,
-                variables: &[],
-                draws: Draws::default(),
-                started: Instant::now(),
-                steps: 0,
-            };
-            match evaluate(&n.value, &mut env)? {
-                Value::Num(x) if x >= 1.0 => Ok(Start::BestOf(x as u64)),
-                v => Err(ChainError::Run(fail(n.value.span, format!("a number of draws was expected, got {v}")))),
-            }
-        }
-        _ => Err(wrong()),
-    }
-}
-
 /// The name and arguments of a call.
-fn call(e: &Expr) -> Option<(&str, &[crate::syntax::ast::Arg])> {
+pub(super) fn call(e: &Expr) -> Option<(&str, &[crate::syntax::ast::Arg])> {
     match &e.kind {
         ExprKind::Call { callee, args } => match &callee.kind {
             ExprKind::Var(name) => Some((name, args)),
@@ -221,6 +201,12 @@ fn call(e: &Expr) -> Option<(&str, &[crate::syntax::ast::Arg])> {
         },
         _ => None,
     }
+}
+
+/// An argument by its name or place.
+pub(super) fn argument<'a>(args: &'a [crate::syntax::ast::Arg], place: usize, name: &str) -> Option<&'a Expr> {
+    let named = args.iter().find(|a| a.name.as_ref().is_some_and(|n| &*n.node == name));
+    named.or_else(|| args.get(place).filter(|a| a.name.is_none())).map(|a| &a.value)
 }
 
 impl Runner<'_> {
@@ -253,8 +239,8 @@ impl Runner<'_> {
         }
     }
 
-    /// Applies the program's `force` and `freeze`.
-    fn force_and_freeze(&mut self) -> Result<(), ChainError> {
+    /// Applies the program's `freeze`.
+    fn freeze(&mut self) -> Result<(), ChainError> {
         for f in &self.code.freezes {
             let draws = self.predictive();
             let mut env = Scope {
@@ -271,7 +257,6 @@ impl Runner<'_> {
                 old => Selector::Union(Box::new(old), Box::new(s)),
             };
         }
-        super::force::apply(self.code, &mut self.trace, self.options, self.chain)?;
         Ok(())
     }
 
@@ -335,26 +320,6 @@ impl Runner<'_> {
             KStmtKind::Propose { .. } => Err(fail(s.span, "`propose` belongs in a kernel".into()).into()),
             KStmtKind::Expr(e) => self.apply(e),
         }
-    }
-
-    fn warmup(&mut self, count: &Expr, body: &[KStmt]) -> Result<Flow, ChainError> {
-        let passes = self.count(count)?;
-        self.in_warmup = true;
-        let mut flow = Flow::Next;
-        let (mut i, first) = (0, self.step);
-        // More passes than the program says only if they get somewhere: a loop without kernels would never end.
-        let unbounded = self.options.warmup.is_some();
-        while i < passes || unbounded && (i == 0 || self.step > first) {
-            flow = self.pass(i, passes, body)?;
-            i += 1;
-            if flow != Flow::Next {
-                break;
-            }
-        }
-        self.in_warmup = false;
-        self.power = 1.0;
-        self.warmup_steps = self.step;
-        Ok(if flow == Flow::End && self.is_cancelled() { Flow::End } else { Flow::Next })
     }
 
     fn repeat(&mut self, count: &Expr, body: &[KStmt]) -> Result<Flow, ChainError> {
@@ -529,37 +494,6 @@ impl Runner<'_> {
     /// The text of a kernel for tables.
     fn label(&self, e: &Expr) -> String {
         crate::syntax::print_expr(e)
-    }
-
-    /// `anneal(from)`: raises the power of the likelihood from 1/from to 1 over a warm-up.
-    fn anneal(&mut self, e: &Expr, args: &[crate::syntax::ast::Arg]) -> Result<Flow, ChainError> {
-        if !self.in_warmup {
-            return Err(fail(e.span, "anneal belongs in a warmup: its draws are discarded".into()).into());
-        }
-        let from = match args {
-            [a] => match self.value(&a.value)? {
-                Value::Num(t) if t >= 1.0 => t,
-                v => {
-                    return Err(fail(a.value.span, format!("a temperature of at least 1 was expected, got {v}")).into());
-                }
-            },
-            _ => return Err(fail(e.span, "anneal takes one temperature to start from".into()).into()),
-        };
-        let number = |name: &str| match self.variables.iter().rev().find(|(n, _)| &**n == name) {
-            Some((_, Value::Num(x))) => *x,
-            _ => 0.0,
-        };
-        // With a time limit, by the clock: the steps are recorded, and a replay by steps counts passes instead.
-        let share = match (self.options.warmup, self.options.time) {
-            (Some(n), _) => self.step as f64 / (n.max(1) as f64),
-            (None, Some(t)) => {
-                let clock = self.started.elapsed().as_secs_f64() / (t.as_secs_f64() / 2.0);
-                clock.max(number(PASS) / number(PASSES).max(1.0))
-            }
-            (None, None) => number(PASS) / number(PASSES).max(1.0),
-        };
-        self.power = libm::pow(from, -(1.0 - share.clamp(0.0, 1.0)));
-        Ok(Flow::Next)
     }
 
     /// Records a draw.

@@ -1,0 +1,69 @@
+//! Warm-up: loops whose draws are thrown away, in which kernels learn and the likelihood may be annealed.
+
+use super::{ChainError, Flow, PASS, PASSES, Runner};
+use crate::infer::selection::fail;
+use crate::lang::value::Value;
+use crate::rng::{Purpose, Stream, StreamKey};
+use crate::syntax::ast::{Arg, Expr, KStmt};
+
+impl Runner<'_> {
+    pub(super) fn warmup(&mut self, count: &Expr, body: &[KStmt]) -> Result<Flow, ChainError> {
+        let passes = self.count(count)?;
+        self.in_warmup = true;
+        let mut flow = Flow::Next;
+        let (mut i, first) = (0, self.step);
+        // More passes than the program says only if they get somewhere: a loop without kernels would never end.
+        let unbounded = self.options.warmup.is_some();
+        while i < passes || unbounded && (i == 0 || self.step > first) {
+            flow = self.pass(i, passes, body)?;
+            i += 1;
+            if flow != Flow::Next {
+                break;
+            }
+        }
+        let (draws, mut rng) = (self.predictive(), self.population_stream());
+        self.population.finish(&mut self.trace, draws, &mut rng)?;
+        self.in_warmup = false;
+        self.power = 1.0;
+        self.warmup_steps = self.step;
+        Ok(if flow == Flow::End && self.is_cancelled() { Flow::End } else { Flow::Next })
+    }
+
+    /// `anneal(from)`: raises the power of the likelihood from 1/from to 1 over a warm-up.
+    pub(super) fn anneal(&mut self, e: &Expr, args: &[Arg]) -> Result<Flow, ChainError> {
+        if !self.in_warmup {
+            return Err(fail(e.span, "anneal belongs in a warmup: its draws are discarded".into()).into());
+        }
+        let from = match args {
+            [a] => match self.value(&a.value)? {
+                Value::Num(t) if t >= 1.0 => t,
+                v => {
+                    return Err(fail(a.value.span, format!("a temperature of at least 1 was expected, got {v}")).into());
+                }
+            },
+            _ => return Err(fail(e.span, "anneal takes one temperature to start from".into()).into()),
+        };
+        let number = |name: &str| match self.variables.iter().rev().find(|(n, _)| &**n == name) {
+            Some((_, Value::Num(x))) => *x,
+            _ => 0.0,
+        };
+        // With a time limit, by the clock: the steps are recorded, and a replay by steps counts passes instead.
+        let share = match (self.options.warmup, self.options.time) {
+            (Some(n), _) => self.step as f64 / (n.max(1) as f64),
+            (None, Some(t)) => {
+                let clock = self.started.elapsed().as_secs_f64() / (t.as_secs_f64() / 2.0);
+                clock.max(number(PASS) / number(PASSES).max(1.0))
+            }
+            (None, None) => number(PASS) / number(PASSES).max(1.0),
+        };
+        let share = share.clamp(0.0, 1.0);
+        let power = libm::pow(from, share - 1.0);
+        let (draws, mut rng) = (self.predictive(), self.population_stream());
+        self.power = self.population.advance(&mut self.trace, (share, power), draws, &mut rng)?;
+        Ok(Flow::Next)
+    }
+
+    fn population_stream(&self) -> Stream {
+        StreamKey::new(self.options.seed, self.chain, Purpose::POPULATION).stream(self.step, 0, 0)
+    }
+}

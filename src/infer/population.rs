@@ -1,0 +1,103 @@
+//! A population of states that shrinks to one while the likelihood is annealed.
+//!
+//! Far from the posterior a single annealed chain ends in whichever mode drew it first. A population explores several: its
+//! members move in turn under the same kernels, and as the power of the likelihood rises from b to b', each gets offspring in
+//! proportion to likelihood^(b' - b), as in population annealing (Hukushima & Iba 2003) and sequential Monte Carlo samplers
+//! (Del Moral, Doucet & Jasra 2006). The number falls geometrically as the power rises, so that those who are left get more of
+//! the time. It belongs to warm-up: the states it goes through are not draws.
+
+use crate::rng::Stream;
+use crate::trace::{Constraint, Draws, Trace, TraceResult};
+
+/// Steps a member makes before it is the next one's turn: enough that going over, a full update, costs little beside them.
+const LEG: u64 = 16;
+
+type State = Vec<(u64, Constraint)>;
+
+/// States and their log-likelihoods; the chain's trace is in the one whose turn it is.
+#[derive(Debug)]
+pub(crate) struct Population {
+    members: Vec<(State, f64)>,
+    first: usize,
+    turn: usize,
+    steps: u64,
+    power: Option<f64>,
+}
+
+impl Population {
+    /// One member a trace; the chain must be in the first.
+    pub fn new(traces: &[Trace]) -> Self {
+        let members: Vec<_> = match traces {
+            [_] => Vec::new(),
+            _ => traces.iter().map(|t| (t.constraints(), t.log_likelihood())).collect(),
+        };
+        Population { first: members.len(), members, turn: 0, steps: 0, power: None }
+    }
+
+    /// Called after each step of the annealing, with the share of it that is done and the power that belongs to it. Gives the
+    /// power of the next step: it stays the same until every member has had its turn.
+    ///
+    /// # Errors
+    /// Those of the program.
+    pub fn advance(
+        &mut self,
+        trace: &mut Trace,
+        (share, power): (f64, f64),
+        draws: Draws,
+        rng: &mut Stream,
+    ) -> TraceResult<f64> {
+        let present = *self.power.get_or_insert(power);
+        self.steps += 1;
+        if self.members.len() < 2 {
+            self.power = Some(power);
+            return Ok(power);
+        }
+        if !self.steps.is_multiple_of(LEG) {
+            return Ok(present);
+        }
+        self.members[self.turn] = (trace.constraints(), trace.log_likelihood());
+        self.turn += 1;
+        if self.turn == self.members.len() {
+            self.turn = 0;
+            let left = libm::round(libm::pow(self.first as f64, 1.0 - share)) as usize;
+            self.resample(power - present, left.clamp(1, self.members.len()), rng);
+            self.power = Some(power);
+        }
+        trace.restore(&self.members[self.turn].0, draws)?;
+        Ok(self.power.unwrap_or(power))
+    }
+
+    /// Ends with one member, taken at the full power, as the state of the chain.
+    ///
+    /// # Errors
+    /// Those of the program.
+    pub fn finish(&mut self, trace: &mut Trace, draws: Draws, rng: &mut Stream) -> TraceResult<()> {
+        if self.members.len() > 1 {
+            self.members[self.turn] = (trace.constraints(), trace.log_likelihood());
+            self.resample(1.0 - self.power.unwrap_or(0.0), 1, rng);
+            trace.restore(&self.members[0].0, draws)?;
+        }
+        self.members.clear();
+        Ok(())
+    }
+
+    /// Systematic resampling (Kitagawa 1996): each member gets the whole number of offspring next to its share.
+    fn resample(&mut self, step: f64, left: usize, rng: &mut Stream) {
+        let top = self.members.iter().map(|m| step * m.1).fold(f64::NEG_INFINITY, f64::max);
+        let weights: Vec<f64> = self.members.iter().map(|m| libm::exp(step * m.1 - top)).collect();
+        let spacing = weights.iter().sum::<f64>() / left as f64;
+        let (mut at, mut reached) = (rng.uniform() * spacing, 0.0);
+        let mut chosen = Vec::with_capacity(left);
+        for (i, w) in weights.iter().enumerate() {
+            reached += w;
+            while at < reached && chosen.len() < left {
+                chosen.push(i);
+                at += spacing;
+            }
+        }
+        // Rounding may leave the last place empty.
+        let last = weights.len() - 1;
+        chosen.resize(left, last);
+        self.members = chosen.into_iter().map(|i| self.members[i].clone()).collect();
+    }
+}
