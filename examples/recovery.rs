@@ -17,6 +17,9 @@ use std::time::Duration;
 
 const SIZE: u32 = 256;
 
+/// Where the default camera stands on the z axis.
+const EYE: f64 = 8.0;
+
 fn compile(map: ContourMap) -> Result<Model, pcadlang::Error> {
     let image = Value::object(ImageValue::contours(map, None));
     let program = Program::parse(embedded("lathe.pcad").unwrap_or_default())?
@@ -84,12 +87,33 @@ fn truth(trace: &mut Trace, column: &str) -> Option<f64> {
     }
 }
 
+/// The radius at 51 heights from the bottom to the top, as fractions of the height; `get` reads a column.
+fn shape(get: &mut dyn FnMut(&str) -> f64) -> Vec<f64> {
+    let (h, c) = (get("H"), get("c"));
+    let mut points = Vec::new();
+    for (part, lo, hi) in [("lower", 0.0, c), ("upper", c, 1.0)] {
+        points.extend((0..10).map(|i| (lo + (hi - lo) * f64::from(i) / 9.0, get(&format!("{part}/r[{i}]")) / h)));
+    }
+    let at = |y: f64| {
+        let i = points.partition_point(|p| p.0 <= y).clamp(1, points.len() - 1);
+        let (a, b) = (points[i - 1], points[i]);
+        let t = if b.0 > a.0 { ((y - a.0) / (b.0 - a.0)).clamp(0.0, 1.0) } else { 0.5 };
+        a.1 + t * (b.1 - a.1)
+    };
+    (0..=50).map(|i| at(f64::from(i) / 50.0)).collect()
+}
+
+/// Root mean square of the differences.
+fn rms(a: &[f64], b: &[f64]) -> f64 {
+    (a.iter().zip(b).map(|(a, b)| (a - b).powi(2)).sum::<f64>() / a.len() as f64).sqrt()
+}
+
 fn main() -> Result<(), pcadlang::Error> {
     let argument = |i: usize, default: u64| std::env::args().nth(i).and_then(|a| a.parse().ok()).unwrap_or(default);
     let (cases, seconds) = (argument(1, 20), argument(2, 20));
-    println!("case  |dH|/H  |dx|,|dy|  |dz|   tilt   profile  within 90 %  R-hat  log joint (truth)");
+    println!("case    size       H  x and y       z   tilt    shape  held by 90 %  R-hat  log joint, best (truth)");
     let (mut held, mut asked) = (0, 0);
-    let mut errors: Vec<[f64; 5]> = Vec::new();
+    let mut errors: Vec<[f64; 6]> = Vec::new();
     for case in 0..cases {
         let (mut t, map) = scene(case)?;
         let model = compile(map)?;
@@ -97,51 +121,68 @@ fn main() -> Result<(), pcadlang::Error> {
         let constraints = t.constraints();
         let draws = Draws { key: StreamKey::new(0, 0, Purpose::PREDICT), step: 0, lane: 0 };
         let rebuilt = Trace::generate(Arc::clone(model.code()), constraints, draws, Default::default());
-        let best = rebuilt.map_or(f64::NAN, |(t, _)| t.log_joint());
+        let score = rebuilt.map_or(f64::NAN, |(t, _)| t.log_joint());
         let options = RunOptions { seed: case + 1, time: Some(Duration::from_secs(seconds)), ..RunOptions::default() };
-        let posterior = model.run(&options, 2, 2)?;
+        let posterior = model.run(&options, 4, 2)?;
         let quantities = posterior.quantities();
-        let h = truth(&mut t, "H").unwrap_or(f64::NAN);
-        let mut error = |names: &[&str]| -> f64 {
-            let mut of = |n: &&str| {
-                let q: Option<&Quantity> = quantities.iter().find(|q| q.name == **n);
-                q.and_then(|q| truth(&mut t, n).map(|x| (q.summary.q50 - x).powi(2))).unwrap_or(f64::NAN)
-            };
-            names.iter().map(&mut of).sum::<f64>().sqrt()
+        let mut found = |name: &str| -> f64 {
+            let q: Option<&Quantity> = quantities.iter().find(|q| q.name == name);
+            q.map_or(f64::NAN, |q| q.summary.q50)
         };
-        let profile: Vec<String> = (0..10).flat_map(|i| [format!("lower/r[{i}]"), format!("upper/r[{i}]")]).collect();
-        let profile: Vec<&str> = profile.iter().map(String::as_str).collect();
+        let mut known = |name: &str| truth(&mut t, name).unwrap_or(f64::NAN);
+        let distance = |names: &[&str], known: &mut dyn FnMut(&str) -> f64, found: &mut dyn FnMut(&str) -> f64| {
+            names.iter().map(|n| (known(n) - found(n)).powi(2)).sum::<f64>().sqrt()
+        };
+        let z = "S_L/translate/z";
+        // How large it looks: what one picture tells, while height and distance trade against each other.
+        let size = |get: &mut dyn FnMut(&str) -> f64| get("H") / (EYE - get(z));
         let e = [
-            error(&["H"]) / h,
-            error(&["S_L/translate/x", "S_L/translate/y"]),
-            error(&["S_L/translate/z"]),
-            error(&["S_L/axis/x", "S_L/axis/y", "S_L/axis/z"]).to_degrees(),
-            error(&profile) / 20f64.sqrt() / h,
+            (size(&mut found) / size(&mut known) - 1.0).abs(),
+            (found("H") / known("H") - 1.0).abs(),
+            distance(&["S_L/translate/x", "S_L/translate/y"], &mut known, &mut found),
+            distance(&[z], &mut known, &mut found),
+            distance(&["S_L/axis/x", "S_L/axis/y", "S_L/axis/z"], &mut known, &mut found).to_degrees(),
+            rms(&shape(&mut found), &shape(&mut known)),
         ];
         let (mut inside, mut all) = (0, 0);
-        for q in &quantities {
+        for q in quantities.iter().filter(|q| q.name != "log_joint") {
             if let Some(x) = truth(&mut t, &q.name) {
                 all += 1;
                 inside += usize::from((q.summary.q05..=q.summary.q95).contains(&x));
             }
         }
         (held, asked) = (held + inside, asked + all);
-        let log = &quantities[0].summary;
+        let worst = quantities.iter().map(|q| q.summary.r_hat).fold(0.0, f64::max);
+        let best =
+            posterior.chains.iter().filter_map(|c| c.best.as_ref().map(|b| b.0)).fold(f64::NEG_INFINITY, f64::max);
         println!(
-            "{case:4}  {:6.3}  {:9.3}  {:5.3}  {:4.1}°  {:7.4}  {inside:3} of {all:2}    {:5.2}  {:8.1} ({best:.1})",
-            e[0], e[1], e[2], e[3], e[4], log.r_hat, log.q50
+            "{case:4}  {:5.1} %  {:4.1} %    {:5.3}   {:5.3}  {:4.1}°  {:6.4}      {inside:2} of {all:2}  {worst:5.2}  {best:8.1} ({score:.1})",
+            100.0 * e[0],
+            100.0 * e[1],
+            e[2],
+            e[3],
+            e[4],
+            e[5]
         );
         errors.push(e);
     }
-    let median = |i: usize| {
+    let quantile = |i: usize, q: f64| {
         let mut v: Vec<f64> = errors.iter().map(|e| e[i]).collect();
         v.sort_by(f64::total_cmp);
-        v.get(v.len() / 2).copied().unwrap_or(f64::NAN)
+        v.get((q * v.len() as f64) as usize).copied().unwrap_or(f64::NAN)
     };
-    println!("median {:6.3} {:9.3}  {:5.3}  {:4.1}°  {:7.4}", median(0), median(1), median(2), median(3), median(4));
-    println!(
-        "90 % intervals hold {held} of {asked} values ({:.0} %)",
-        100.0 * f64::from(held as u32) / f64::from(asked as u32)
-    );
+    for (name, q) in [("half", 0.5), ("3/4 ", 0.75)] {
+        let e: Vec<f64> = (0..6).map(|i| quantile(i, q)).collect();
+        println!(
+            "{name}  {:5.1} %  {:4.1} %    {:5.3}   {:5.3}  {:4.1}°  {:6.4}",
+            100.0 * e[0],
+            100.0 * e[1],
+            e[2],
+            e[3],
+            e[4],
+            e[5]
+        );
+    }
+    println!("90 % intervals hold {held} of {asked} values ({:.0} %)", 100.0 * held as f64 / asked as f64);
     Ok(())
 }
