@@ -6,10 +6,10 @@ use super::super::elements::Elements;
 use super::super::field::{Edge, Edges, channel, turn_between};
 
 /// Buckets along the longer side.
-const BUCKETS: f32 = 32.0;
+const BUCKETS: f32 = 12.0;
 
 /// Observed points that are measured; of more, every so many-th in the order of the buckets stands for its neighbours.
-const POINTS: usize = 1024;
+const POINTS: usize = 512;
 
 /// Memory that evaluations reuse.
 #[derive(Debug, Clone, Default)]
@@ -18,9 +18,18 @@ pub struct Scratch {
     sorted: Vec<Piece>,
     /// Where each bucket starts in `sorted`, and at the end its length.
     start: Vec<u32>,
-    /// Buckets that are not empty, with the least cost of a piece in each.
-    filled: Vec<(u32, f32)>,
+    filled: Vec<Filled>,
     near: Vec<(f32, u32)>,
+}
+
+/// A bucket that is not empty.
+#[derive(Debug, Clone, Copy)]
+struct Filled {
+    bucket: u32,
+    across: u16,
+    down: u16,
+    /// The least cost of a piece in it.
+    cost: f32,
 }
 
 /// A piece of contour and what it costs, in pixels, besides the distance.
@@ -41,6 +50,8 @@ pub(super) struct Reverse {
     down: usize,
     /// Side of a bucket in pixels.
     side: f32,
+    /// Least and greatest distance in pixels between points of two buckets, by how many lie between them down and across.
+    gaps: Vec<(f32, f32)>,
 }
 
 impl Reverse {
@@ -49,7 +60,10 @@ impl Reverse {
         let side = (width.max(height) as f32 / BUCKETS).max(1.0);
         let across = ((width as f32 / side).ceil() as usize).max(1);
         let down = ((height as f32 / side).ceil() as usize).max(1);
-        let mut r = Reverse { points: Vec::new(), stands_for: 1.0, start: Vec::new(), across, down, side };
+        let norm = |u: usize, v: usize| ((u * u + v * v) as f32).sqrt() * side;
+        let gap = |v: usize, u: usize| (norm(u.saturating_sub(1), v.saturating_sub(1)), norm(u + 1, v + 1));
+        let gaps = (0..down).flat_map(|v| (0..across).map(move |u| gap(v, u))).collect();
+        let mut r = Reverse { points: Vec::new(), stands_for: 1.0, start: Vec::new(), across, down, side, gaps };
         let (mut start, mut sorted) = (Vec::new(), Vec::new());
         let points: Vec<Piece> = grid
             .edges
@@ -118,17 +132,28 @@ impl Reverse {
         filled.clear();
         filled.extend((0..self.across * self.down).filter(|&b| start[b] < start[b + 1]).map(|b| {
             let held = &sorted[start[b] as usize..start[b + 1] as usize];
-            (b as u32, held.iter().map(|p| p.cost).fold(f32::INFINITY, f32::min))
+            let (across, down) = ((b % self.across) as u16, (b / self.across) as u16);
+            let cost = held.iter().map(|p| p.cost).fold(f32::INFINITY, f32::min);
+            Filled { bucket: b as u32, across, down, cost }
         }));
         for b in 0..self.across * self.down {
             let points = &self.points[self.start[b] as usize..self.start[b + 1] as usize];
             if points.is_empty() {
                 continue;
             }
-            let bound = filled.iter().map(|&(c, cost)| self.gap(b, c as usize).1 + cost).fold(f32::INFINITY, f32::min);
+            let (across, down) = ((b % self.across) as u16, (b / self.across) as u16);
+            let gap = |c: &Filled| {
+                let (u, v) = (c.across.abs_diff(across), c.down.abs_diff(down));
+                self.gaps[usize::from(v) * self.across + usize::from(u)]
+            };
+            let mut bound = f32::INFINITY;
+            for c in filled.iter() {
+                let most = gap(c).1 + c.cost;
+                bound = if most < bound { most } else { bound };
+            }
             let reach = bound + 4.0 * turn + 2.0 * slack;
             near.clear();
-            near.extend(filled.iter().map(|&(c, _)| (self.gap(b, c as usize).0, c)).filter(|n| n.0 <= reach));
+            near.extend(filled.iter().map(|c| (gap(c).0, c.bucket)).filter(|n| n.0 <= reach));
             near.sort_unstable_by(|a, b| a.0.total_cmp(&b.0).then(a.1.cmp(&b.1)));
             for p in points {
                 let mut best = f32::INFINITY;
@@ -144,13 +169,5 @@ impl Reverse {
                 f(2.0 * p.edge.half * self.stands_for, best);
             }
         }
-    }
-
-    /// Least and greatest distance in pixels between points of two buckets.
-    fn gap(&self, a: usize, b: usize) -> (f32, f32) {
-        let u = (a % self.across).abs_diff(b % self.across);
-        let v = (a / self.across).abs_diff(b / self.across);
-        let norm = |u: usize, v: usize| ((u * u + v * v) as f32).sqrt() * self.side;
-        (norm(u.saturating_sub(1), v.saturating_sub(1)), norm(u + 1, v + 1))
     }
 }
