@@ -25,7 +25,8 @@ fn compile(map: ContourMap) -> Result<Model, pcadlang::Error> {
     let program = Program::parse(embedded("lathe.pcad").unwrap_or_default())?
         .observe("photo", image)
         .camera(Camera::default_for(SIZE, SIZE))
-        .set("clean", "true");
+        .set("clean", "true")
+        .set("sigma", "0.1");
     let settings: Vec<String> = std::env::args().skip(3).collect();
     let set = |p: Program, s: &String| match s.split_once('=') {
         Some((name, value)) => p.set(name, value),

@@ -31,7 +31,7 @@ use std::fmt;
 use std::sync::Arc;
 
 /// What is wrong with a program, its data, or a run of it: messages with their places.
-#[derive(Clone, Debug)]
+#[derive(Clone)]
 pub struct Error {
     /// The messages.
     pub diagnostics: Vec<Diagnostic>,
@@ -42,6 +42,13 @@ pub struct Error {
 impl fmt::Display for Error {
     fn fmt(&self, f: &mut fmt::Formatter<'_>) -> fmt::Result {
         f.write_str(&render(&self.sources, &self.diagnostics, false))
+    }
+}
+
+/// As it is shown: what a `main` that returns it prints is for people too.
+impl fmt::Debug for Error {
+    fn fmt(&self, f: &mut fmt::Formatter<'_>) -> fmt::Result {
+        fmt::Display::fmt(self, f)
     }
 }
 

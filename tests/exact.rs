@@ -292,3 +292,24 @@ fn predictions_are_drawn_anew_and_not_proposed() {
         / d["unused"].iter().map(|x| (x - 10.0) * (x - 10.0)).sum::<f64>();
     assert!(lag.abs() < 0.03, "draws of what nothing asks for are independent, lag-1 correlation {lag}");
 }
+
+/// Two far modes: an annealed population ends in each as often as its mass says, which no chain of small steps does.
+#[test]
+fn a_population_settles_by_mass() {
+    let draws = run(
+        "assume x ~ normal(0, 5);
+         factor(log_sum_exp([log(0.7) - (x - 6) ** 2 / 0.5, log(0.3) - (x + 6) ** 2 / 0.5]));
+         infer {
+           init(best_of(40, keep = 40));
+           warmup 12000 { anneal(200); drift(one(@**)); }
+           repeat 1 { collect x; }
+         }",
+        5,
+        300,
+    );
+    let x = &draws["x"];
+    assert_eq!(x.len(), 300);
+    // Three standard errors of a share of 0.7 in 300 chains are 0.08.
+    let right = x.iter().filter(|x| **x > 0.0).count() as f64 / 300.0;
+    assert!((right - 0.7).abs() < 0.08, "{right}");
+}

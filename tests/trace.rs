@@ -298,3 +298,29 @@ fn runaway_programs_are_stopped() {
     assert!(fails("for t in 0 .. 3 { s[t] ~ normal(s[t], 1); observe normal(s[t], 1) = 0; }").contains("needs"));
     assert!(fails("for i in 0 .. 3 { t[1] ~ normal(0, 1); } observe normal(t[1], 1) = 0;").contains("twice"));
 }
+
+/// Going over to a saved state is the same as building it, whatever structure lies between.
+#[test]
+fn restored_states_are_the_saved_ones() {
+    for (name, text) in PROGRAMS {
+        let (_, mut t) = trace(&program(text), 3);
+        let all = t.select(&Selector::All);
+        let mut saved = Vec::new();
+        for step in 0..60 {
+            t.rollback();
+            let targets = t.targets(all).to_vec();
+            let changes: Vec<_> = targets.iter().map(|x| (*x, Change::Resample)).collect();
+            if t.propose(&changes, at(step)).is_ok_and(|w| w.log_weight > -40.0) {
+                t.commit();
+                saved.push((t.constraints(), t.log_joint(), addresses(&t)));
+            }
+        }
+        assert!(saved.len() > 5, "{name}");
+        for i in (0..saved.len()).rev().chain([saved.len() / 2, 0]) {
+            let (state, log_joint, names) = &saved[i];
+            t.restore(state, at(1000)).unwrap_or_else(|e| panic!("{name}: {e:?}"));
+            assert_eq!(t.log_joint().to_bits(), log_joint.to_bits(), "{name}, state {i}");
+            assert_eq!(&addresses(&t), names, "{name}, state {i}");
+        }
+    }
+}

@@ -83,8 +83,13 @@ impl Population {
 
     /// Systematic resampling (Kitagawa 1996): each member gets the whole number of offspring next to its share.
     fn resample(&mut self, step: f64, left: usize, rng: &mut Stream) {
-        let top = self.members.iter().map(|m| step * m.1).fold(f64::NEG_INFINITY, f64::max);
-        let weights: Vec<f64> = self.members.iter().map(|m| libm::exp(step * m.1 - top)).collect();
+        // Nobody dies at an equal power, though 0 times infinity is NaN.
+        let gain = |m: &(State, f64)| if step == 0.0 { 0.0 } else { step * m.1 };
+        let top = self.members.iter().map(gain).fold(f64::NEG_INFINITY, f64::max);
+        let weights: Vec<f64> = match top {
+            f64::NEG_INFINITY => vec![1.0; self.members.len()],
+            _ => self.members.iter().map(|m| libm::exp(gain(m) - top)).collect(),
+        };
         let spacing = weights.iter().sum::<f64>() / left as f64;
         let (mut at, mut reached) = (rng.uniform() * spacing, 0.0);
         let mut chosen = Vec::with_capacity(left);
@@ -99,5 +104,44 @@ impl Population {
         let last = weights.len() - 1;
         chosen.resize(left, last);
         self.members = chosen.into_iter().map(|i| self.members[i].clone()).collect();
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+    use crate::rng::{Purpose, StreamKey};
+
+    fn population(log_likelihoods: &[f64]) -> Population {
+        let state = |i: usize| vec![(i as u64, Constraint::Stored(crate::dist::Datum::Num(0.0)))];
+        let members: Vec<_> = log_likelihoods.iter().enumerate().map(|(i, l)| (state(i), *l)).collect();
+        Population { first: members.len(), members, turn: 0, steps: 0, power: None }
+    }
+
+    fn offspring(p: &Population, of: u64) -> usize {
+        p.members.iter().filter(|(s, _)| s[0].0 == of).count()
+    }
+
+    #[test]
+    fn offspring_are_in_proportion() {
+        for seed in 0..200 {
+            let mut rng = StreamKey::new(seed, 0, Purpose::POPULATION).stream(0, 0, 0);
+            let mut p = population(&[0.0, libm::log(6.0), libm::log(3.0), f64::NEG_INFINITY]);
+            p.resample(1.0, 10, &mut rng);
+            assert_eq!([0, 1, 2, 3].map(|i| offspring(&p, i)), [1, 6, 3, 0]);
+            // At an equal power everyone has the same chance, and the number may fall.
+            let mut p = population(&[-1e300, 5.0, 700.0, 0.0]);
+            p.resample(0.0, 2, &mut rng);
+            assert_eq!(p.members.len(), 2);
+            assert!((0..4).all(|i| offspring(&p, i) <= 1));
+        }
+    }
+
+    #[test]
+    fn impossible_members_leave_no_trace_of_nan() {
+        let mut rng = StreamKey::new(1, 0, Purpose::POPULATION).stream(0, 0, 0);
+        let mut p = population(&[f64::NEG_INFINITY, f64::NEG_INFINITY]);
+        p.resample(0.5, 2, &mut rng);
+        assert_eq!(p.members.len(), 2);
     }
 }

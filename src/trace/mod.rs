@@ -92,7 +92,7 @@ impl Trace {
     }
 
     /// Proposes changes and updates what depends on them. The update is pending until [`Trace::commit`] or
-    /// [`Trace::rollback`]; a second proposal rolls the first back.
+    /// [`Trace::rollback`]; a second proposal rolls the first back, and its targets must be of the state before that.
     ///
     /// # Errors
     /// What goes wrong under the proposed values; the trace is then as before.
