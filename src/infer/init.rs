@@ -20,7 +20,7 @@ use std::time::Instant;
 pub struct Start {
     /// Draws of positive probability that are tried.
     pub draws: u64,
-    /// How many of the best are kept: more than one begin a population (see [`super::Population`]).
+    /// How many of the best are kept: more than one begin a population that anneals in warm-up.
     pub keep: usize,
 }
 
