@@ -168,7 +168,7 @@ impl Program {
         let kind = self.interface().data.iter().find(|d| d.name == name).and_then(|d| d.ty.clone());
         let kind = kind.unwrap_or_else(|| "image".into());
         let loaded = match std::fs::read(path) {
-            Ok(bytes) => data::load(&kind, path, &bytes),
+            Ok(bytes) => data::load(&kind, path, &bytes, &|other| sibling(&Disk, path, other)),
             Err(e) => Err(Fault::new(FaultKind::Other, format!("cannot read {path}: {}", reason(&e)))),
         };
         match loaded {
@@ -225,7 +225,7 @@ impl Program {
         let read_data = |kind: &str, path: &str, folder: &str| {
             let beside = format!("{folder}{path}");
             match read(loader, &beside) {
-                Ok((bytes, _)) => data::load(kind, &beside, &bytes),
+                Ok((bytes, _)) => data::load(kind, &beside, &bytes, &|other| sibling(loader, &beside, other)),
                 Err(e) => Err(Fault::new(FaultKind::Other, format!("cannot read {beside}: {}", reason(&e)))),
             }
         };
@@ -245,6 +245,13 @@ impl Program {
             Err(diagnostics) => Err(Error { diagnostics, sources: self.sources }),
         }
     }
+}
+
+/// The contents of a file named relative to another.
+fn sibling(loader: &dyn Loader, file: &str, other: &str) -> Result<Vec<u8>, String> {
+    let folder = file.rfind(['/', '\\']).map_or("", |i| &file[..=i]);
+    let path = format!("{folder}{other}");
+    read(loader, &path).map(|(bytes, _)| bytes).map_err(|e| format!("cannot read {path}: {}", reason(&e)))
 }
 
 /// A hash of all a program's text and settings: a saved trace belongs to it.

@@ -3,11 +3,13 @@
 //! World: right-handed, y up; lengths in scene units, angles in radians. Knows nothing of cameras or programs.
 
 mod affine;
+pub mod armature;
 mod bounds;
 mod cuboid;
 mod edges;
 mod error;
 pub mod glb;
+mod landmark;
 mod lathe;
 mod mesh;
 pub mod obj;
@@ -20,6 +22,7 @@ pub use affine::Affine;
 pub use bounds::Bounds;
 pub use cuboid::cuboid;
 pub use error::GeomError;
+pub use landmark::Landmark;
 pub use lathe::{Caps, Profile, lathe};
 pub use mesh::{Edge, Mesh, NO_FACE, Topology};
 pub use solid::{Instance, Solid};

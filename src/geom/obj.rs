@@ -20,9 +20,7 @@ const MOST_CORNERS: usize = 1000;
 /// not there before it, there are more than 65535 parts or five million triangles: with the number of the line. If there
 /// are no faces or none has an area.
 pub fn load(bytes: &[u8]) -> Result<Mesh, GeomError> {
-    let text = std::str::from_utf8(bytes)
-        .map_err(|e| GeomError::invalid(format!("the OBJ file is not text (byte {})", e.valid_up_to())))?;
-    let plain = plain(text)?;
+    let plain = plain(text(bytes)?)?;
     let options = tobj::LoadOptions { triangulate: true, ignore_points: true, ignore_lines: true, single_index: false };
     let no_materials = |_: &std::path::Path| Ok((Vec::new(), Default::default()));
     let unreadable = |e: &dyn std::fmt::Display| GeomError::invalid(format!("the OBJ file cannot be read: {e}"));
@@ -39,6 +37,54 @@ pub fn load(bytes: &[u8]) -> Result<Mesh, GeomError> {
         return Err(GeomError::invalid("the OBJ file has no faces"));
     }
     Mesh::new(positions, triangles, parts)
+}
+
+/// Vertices and triangles as the file numbers them, with the name of each triangle's object or group.
+#[derive(Clone, Debug, Default, PartialEq)]
+pub struct Indexed {
+    /// The vertices, in the file's order, used or not.
+    pub positions: Vec<Vec3>,
+    /// The triangles; polygons are cut as fans.
+    pub triangles: Vec<[u32; 3]>,
+    /// The number of each triangle's object or group, by first use.
+    pub parts: Vec<u16>,
+}
+
+/// Reads a mesh with the file's own numbers of vertices, which skin weights go by.
+///
+/// # Errors
+/// As [`load`], but for triangles without area, which stay.
+pub fn indexed(bytes: &[u8]) -> Result<Indexed, GeomError> {
+    let plain = plain(text(bytes)?)?;
+    let (mut out, mut part) = (Indexed::default(), 0u16);
+    for line in plain.lines() {
+        let mut words = line.split(' ');
+        // Only what `plain` wrote is here, so every word reads as a number.
+        match words.next() {
+            Some("v") => {
+                let mut number = || words.next().and_then(|w| w.parse().ok()).unwrap_or(0.0f32);
+                out.positions.push(Vec3::new(number(), number(), number()));
+            }
+            Some("g") => part = words.next().and_then(|w| w.parse().ok()).unwrap_or(part),
+            Some("f") => {
+                let corners: Vec<u32> = words.filter_map(|w| w.parse::<u32>().ok()?.checked_sub(1)).collect();
+                for pair in corners.get(1..).unwrap_or_default().windows(2) {
+                    out.triangles.push([corners[0], pair[0], pair[1]]);
+                    out.parts.push(part);
+                }
+            }
+            _ => {}
+        }
+    }
+    if out.triangles.is_empty() {
+        return Err(GeomError::invalid("the OBJ file has no faces"));
+    }
+    Ok(out)
+}
+
+fn text(bytes: &[u8]) -> Result<&str, GeomError> {
+    std::str::from_utf8(bytes)
+        .map_err(|e| GeomError::invalid(format!("the OBJ file is not text (byte {})", e.valid_up_to())))
 }
 
 /// Checks a file, line by line, and keeps the vertices, the faces' vertex numbers counted from the start, and the parts,

@@ -4,6 +4,7 @@
 //! it computes, because what a run reads must be known before it starts. Which files may be read, and where they lie, is
 //! the host's business: this module gets bytes.
 
+mod armature;
 mod csv;
 mod json;
 
@@ -16,6 +17,9 @@ use crate::vision::{ContourMap, Limits, VisionError, depth, mask, npy, photo};
 use std::sync::Arc;
 
 const SECTION: &str = "Data files";
+
+/// Reads a file by its path relative to that of another, or says why not.
+pub type Beside<'a> = dyn Fn(&str) -> Result<Vec<u8>, String> + 'a;
 
 const FILE: &[Arg] = &[arg("file", Type::Str, "The path, relative to the program's folder.")];
 
@@ -34,6 +38,11 @@ pub(super) const TABLE: &[Builtin] = &[
     kind("contours", Type::Object("an image"), "A ready contour map: bright pixels are contour."),
     kind("mask", Type::Object("a mask"), "A mask: bright pixels are the object."),
     kind("depth", Type::Object("a depth map"), "A depth map: `.npy`, or a 16-bit PNG in thousandths of a scene unit."),
+    kind(
+        "armature",
+        Type::Object("an armature"),
+        "A rig file, JSON, with the mesh and morphs it names beside it: see `docs/bodies.md`.",
+    ),
     kind("mesh", Type::Object("a solid"), "A Wavefront OBJ mesh; each object or group in it is a part."),
 ];
 
@@ -48,11 +57,12 @@ pub fn kinds() -> impl Iterator<Item = &'static str> {
     TABLE.iter().map(|b| b.name)
 }
 
-/// Reads data of a kind from the bytes of a file; `file` is what messages call it.
+/// Reads data of a kind from the bytes of a file; `file` is what messages call it, and `beside` reads files by paths relative
+/// to it.
 ///
 /// # Errors
 /// An unknown kind, or bytes that are not of that kind: a message with the line where there are lines.
-pub fn load(kind: &str, file: &str, bytes: &[u8]) -> Result<Value, Fault> {
+pub fn load(kind: &str, file: &str, bytes: &[u8], beside: &Beside) -> Result<Value, Fault> {
     let limits = Limits::default();
     let text = |e: VisionError| e.to_string();
     let loaded = match kind {
@@ -69,6 +79,7 @@ pub fn load(kind: &str, file: &str, bytes: &[u8]) -> Result<Value, Fault> {
             let scale = if npy::is_npy(bytes) { 1.0 } else { 1000.0 };
             depth::decode(bytes, scale, &limits).map(|d| Value::object(DepthValue::new(d))).map_err(text)
         }
+        "armature" => armature::load(bytes, beside),
         "mesh" => {
             obj::load(bytes).map(|m| Value::object(SolidValue(Solid::new(Arc::new(m))))).map_err(|e| e.to_string())
         }

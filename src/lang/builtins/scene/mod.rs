@@ -3,13 +3,14 @@
 //! A thin layer: geometry, rendering and comparison are the business of [`crate::geom`], [`crate::render`] and
 //! [`crate::vision`]; here their values become values of the language.
 
+mod bodies;
 mod compare;
 mod objects;
 mod observed;
 mod seeing;
 mod shapes;
 
-pub use objects::{AffineValue, CameraValue, SolidValue, ViewValue};
+pub use objects::{AffineValue, ArmatureValue, CameraValue, SolidValue, ViewValue};
 pub use observed::{DepthValue, ImageValue, MaskValue};
 
 use super::{Arg, Args, Builtin, Kind, Type};
@@ -18,6 +19,7 @@ use crate::lang::error::{Fault, FaultKind};
 use crate::lang::value::Value;
 
 const SOLID: Type = Type::Object("a solid");
+const ARMATURE: Type = Type::Object("an armature");
 const AFFINE: Type = Type::Object("a placement");
 const CAMERA: Type = Type::Object("a camera");
 const VIEW: Type = Type::Object("a view");
@@ -36,7 +38,7 @@ const fn native(
 
 /// All of them.
 pub(super) fn all() -> impl Iterator<Item = Builtin> {
-    [shapes::TABLE, seeing::TABLE, compare::TABLE].into_iter().flatten().copied()
+    [shapes::TABLE, bodies::TABLE, seeing::TABLE, compare::TABLE].into_iter().flatten().copied()
 }
 
 /// A shape that cannot be made: numbers outside their domain reject a proposal, anything else ends the run.

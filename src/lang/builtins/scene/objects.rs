@@ -1,5 +1,6 @@
 //! Scene values as objects of the language.
 
+use crate::geom::armature::Armature;
 use crate::geom::{Affine, Solid};
 use crate::lang::index::xyz;
 use crate::lang::value::{Object, Value};
@@ -25,6 +26,9 @@ impl Object for SolidValue {
         match name {
             "size" => bounds().map(|b| Value::array(b.size().to_array())),
             "height" => bounds().map(|b| Value::Num(b.size().y)),
+            "landmarks" => Some(Value::Record(Arc::new(
+                self.0.landmarks().iter().map(|l| (Arc::clone(&l.name), xyz(l.position.to_array()))).collect(),
+            ))),
             _ => None,
         }
     }
@@ -59,6 +63,36 @@ impl Object for AffineValue {
             "axis" => Some(xyz(self.0.0.matrix3.y_axis.normalize_or_zero().to_array())),
             _ => None,
         }
+    }
+}
+
+/// An armature: a rig with its mesh.
+#[derive(Clone, Debug)]
+pub struct ArmatureValue(pub Arc<Armature>);
+
+impl Object for ArmatureValue {
+    fn type_name(&self) -> &'static str {
+        "an armature"
+    }
+
+    fn as_any(&self) -> &dyn Any {
+        self
+    }
+
+    fn field(&self, name: &str) -> Option<Value> {
+        let names = |names: &mut dyn Iterator<Item = &str>| Value::List(names.map(Value::str).collect());
+        let rig = self.0.rig();
+        match name {
+            "joints" => Some(names(&mut rig.joints().iter().map(|j| &*j.name))),
+            "keypoints" => Some(names(&mut rig.keypoints().iter().map(|k| &*k.name))),
+            "morphs" => Some(names(&mut self.0.morphs())),
+            _ => None,
+        }
+    }
+
+    fn summary(&self) -> Option<String> {
+        let (joints, triangles) = (self.0.rig().joints().len(), self.0.triangles().len());
+        Some(format!("{joints} joints, {triangles} triangles"))
     }
 }
 

@@ -120,6 +120,22 @@ pub(super) fn vector(a: &Args, i: usize, default: DVec3) -> Result<DVec3, Fault>
     }
 }
 
+/// Three numbers, one for all three, or a record of x, y and z.
+pub(super) fn vector_of(v: &Value) -> Option<DVec3> {
+    match v {
+        Value::Num(x) => Some(DVec3::splat(*x)),
+        Value::Array(xs) => <[f64; 3]>::try_from(&**xs).ok().map(DVec3::from_array),
+        Value::Record(r) => {
+            let part = |name: &str| match r.get(name) {
+                Some(Value::Num(x)) => Some(*x),
+                _ => None,
+            };
+            Some(DVec3::new(part("x")?, part("y")?, part("z")?))
+        }
+        _ => None,
+    }
+}
+
 /// One profile or an array of them.
 fn profiles(a: &Args) -> Result<Vec<Profile>, Fault> {
     let wanted = "profiles such as { y: [0, 1], r: [0.5, 0.4] }";

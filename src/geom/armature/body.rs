@@ -1,0 +1,316 @@
+//! Bodies: a rig with a mesh skinned to it, cut into parts by bone, so that a pose that differs in one joint shares the meshes
+//! of the parts it does not move.
+//!
+//! Linear blend skinning: vertex' = sum of w_k M[k] vertex. A triangle belongs to the part of the joint that weighs most in
+//! it. The surface is taken as smooth and closed: it has silhouettes, no creases, and no contour where parts meet.
+//! Single precision for vertices. Invariant: the meshes of a pose do not depend on the poses asked for before.
+
+use super::morph::Morph;
+use super::recent;
+use super::{JointPose, Rig, Rules};
+use crate::geom::{GeomError, Landmark, Mesh, Solid, Topology, edges};
+use glam::{Affine3A, DAffine3, DVec3, Mat3A, Vec3, Vec3A};
+use std::sync::Arc;
+
+/// The most joints that move one vertex.
+pub const MOST_WEIGHTS: usize = 4;
+
+/// The joints that move a vertex, in rig order's numbers, with weights that sum to 1; those beyond have weight 0.
+#[derive(Clone, Copy, Debug, Default, PartialEq)]
+pub struct Influence {
+    /// The joints.
+    pub joints: [u16; MOST_WEIGHTS],
+    /// Their weights.
+    pub weights: [f32; MOST_WEIGHTS],
+}
+
+/// The triangles that belong to one joint.
+#[derive(Debug)]
+pub(super) struct Part {
+    /// The joint.
+    joint: u16,
+    /// The triangles, by the part's own vertices.
+    topology: Arc<Topology>,
+    /// The body's vertex of each of its own.
+    vertices: Vec<u32>,
+    /// The joints that move any of them, in rising order.
+    pub joints: Vec<u16>,
+}
+
+/// What shapes of one body share.
+#[derive(Debug)]
+struct Skin {
+    triangles: Vec<[u32; 3]>,
+    influences: Vec<Influence>,
+    parts: Vec<Part>,
+    morphs: Vec<Morph>,
+}
+
+/// A rig and its mesh.
+#[derive(Debug)]
+pub struct Armature {
+    rig: Rig,
+    positions: Vec<Vec3>,
+    normals: Vec<Vec3>,
+    skin: Arc<Skin>,
+}
+
+impl Armature {
+    /// A mesh on a rig: for each vertex the joints that move it, as numbers in rig order with weights.
+    ///
+    /// # Errors
+    /// A count of influences other than the mesh's of vertices, a weight that is negative or not finite, weights that do not
+    /// sum to 1 (to a thousandth), a joint that is not there, a mesh without area.
+    pub fn new(
+        rig: Rig,
+        positions: Vec<Vec3>,
+        triangles: Vec<[u32; 3]>,
+        influences: Vec<Influence>,
+    ) -> Result<Armature, GeomError> {
+        // Checks the indices and positions, too.
+        Mesh::new(positions.clone(), triangles.clone(), vec![0; triangles.len()])?;
+        if influences.len() != positions.len() {
+            return Err(GeomError::invalid(format!(
+                "the mesh has {} vertices, but there are skin weights for {}",
+                positions.len(),
+                influences.len()
+            )));
+        }
+        let mut influences = influences;
+        for (v, i) in influences.iter_mut().enumerate() {
+            let sum: f32 = i.weights.iter().sum();
+            if i.weights.iter().any(|w| !w.is_finite() || *w < 0.0) || (sum - 1.0).abs() > 1e-3 {
+                return Err(GeomError::invalid(format!("the skin weights of vertex {v} sum to {sum}, not to 1")));
+            }
+            i.weights = i.weights.map(|w| w / sum);
+            for (j, w) in i.joints.iter_mut().zip(i.weights) {
+                if w > 0.0 && usize::from(*j) >= rig.joints().len() {
+                    let count = rig.joints().len();
+                    return Err(GeomError::invalid(format!(
+                        "vertex {v} is moved by joint {j}, but the rig has {count} joints"
+                    )));
+                }
+                if w == 0.0 {
+                    *j = 0;
+                }
+            }
+        }
+        let parts = parts(rig.joints().len(), &triangles, &influences);
+        let normals = edges::smooth_normals(&positions, &triangles);
+        let skin = Arc::new(Skin { triangles, influences, parts, morphs: Vec::new() });
+        Ok(Armature { rig, positions, normals, skin })
+    }
+
+    /// With offsets for its shape.
+    ///
+    /// # Errors
+    /// A morph of another number of vertices or joints, or two of one name.
+    pub fn with_morphs(self, morphs: Vec<Morph>) -> Result<Armature, GeomError> {
+        for (i, m) in morphs.iter().enumerate() {
+            m.check(self.positions.len(), self.rig.joints().len())?;
+            if morphs[..i].iter().any(|other| other.name == m.name) {
+                return Err(GeomError::invalid(format!("two morphs are called `{}`", m.name)));
+            }
+        }
+        let skin = match Arc::try_unwrap(self.skin) {
+            Ok(skin) => Skin { morphs, ..skin },
+            Err(_) => return Err(GeomError::invalid("this body has its morphs already")),
+        };
+        Ok(Armature { skin: Arc::new(skin), ..self })
+    }
+
+    /// The rig.
+    pub fn rig(&self) -> &Rig {
+        &self.rig
+    }
+
+    /// The vertices at rest.
+    pub fn positions(&self) -> &[Vec3] {
+        &self.positions
+    }
+
+    /// The triangles.
+    pub fn triangles(&self) -> &[[u32; 3]] {
+        &self.skin.triangles
+    }
+
+    /// The joints that move each vertex.
+    pub fn influences(&self) -> &[Influence] {
+        &self.skin.influences
+    }
+
+    /// The names of its morphs.
+    pub fn morphs(&self) -> impl Iterator<Item = &str> + Clone {
+        self.skin.morphs.iter().map(|m| &*m.name)
+    }
+
+    /// The same body in another shape: each morph's offsets added so many times. Normals are those of the new rest.
+    ///
+    /// # Errors
+    /// A morph it does not have, an amount that is not finite.
+    pub fn shaped(&self, amounts: &[(&str, f64)]) -> Result<Armature, GeomError> {
+        let mut positions = self.positions.clone();
+        let n = self.rig.joints().len();
+        let (mut heads, mut tails) = (vec![DVec3::ZERO; n], vec![DVec3::ZERO; n]);
+        let mut points = vec![DVec3::ZERO; self.rig.keypoints().len()];
+        for (name, amount) in amounts {
+            let Some(m) = self.skin.morphs.iter().find(|m| *m.name == **name) else {
+                let all: Vec<&str> = self.morphs().collect();
+                return Err(GeomError::invalid(format!("the body has no morph `{name}`; it has {}", all.join(", "))));
+            };
+            if !amount.is_finite() {
+                return Err(GeomError::domain(format!("the amount of the morph `{name}` must be finite")));
+            }
+            m.add(*amount, &mut positions, &mut heads, &mut tails);
+            for (d, k) in points.iter_mut().zip(self.rig.keypoints()) {
+                *d += m.at_keypoint(&self.rig, &self.positions, k) * *amount;
+            }
+        }
+        let normals = edges::smooth_normals(&positions, &self.skin.triangles);
+        let rig = self.rig.moved(&heads, &tails, &points);
+        Ok(Armature { rig, positions, normals, skin: Arc::clone(&self.skin) })
+    }
+
+    /// The body in a pose: one instance a part, numbered by joint, and its keypoints as landmarks. Parts that the last poses
+    /// of this thread moved in the same way are shared with them.
+    ///
+    /// # Errors
+    /// A pose that is not finite, or takes vertices too far to be numbers.
+    pub fn posed(self: &Arc<Self>, pose: &[JointPose], rules: &Rules) -> Result<Solid, GeomError> {
+        let transforms = self.rig.transforms(pose, rules)?;
+        let single: Vec<Affine3A> = transforms.iter().map(DAffine3::as_affine3a).collect();
+        if !single.iter().all(|t| t.is_finite()) {
+            return Err(GeomError::domain("the pose takes the body too far away"));
+        }
+        let meshes = recent::meshes(self, &single);
+        let solid = Solid::of_parts(self.skin.parts.iter().zip(meshes).map(|(p, m)| (m, p.joint)));
+        let landmarks: Vec<Landmark> = self
+            .rig
+            .keypoints()
+            .iter()
+            .map(|k| Landmark { name: Arc::clone(&k.name), position: transforms[k.joint].transform_point3(k.rest) })
+            .collect();
+        Ok(solid.with_landmarks(landmarks))
+    }
+
+    pub(super) fn parts(&self) -> &[Part] {
+        &self.skin.parts
+    }
+
+    /// One part's mesh under the transforms of all joints.
+    pub(super) fn skinned(&self, part: &Part, transforms: &[Affine3A]) -> Mesh {
+        let (mut positions, mut normals) = (Vec::with_capacity(part.vertices.len()), Vec::new());
+        normals.reserve_exact(part.vertices.len());
+        for v in &part.vertices {
+            let v = *v as usize;
+            let (p, n) = (self.positions[v], self.normals[v]);
+            let Influence { joints, weights } = &self.skin.influences[v];
+            let m =
+                if weights[0] == 1.0 { transforms[usize::from(joints[0])] } else { blend(joints, weights, transforms) };
+            positions.push(m.transform_point3a(p.into()).into());
+            normals.push(Vec3::from((cofactor(&m.matrix3) * Vec3A::from(n)).normalize_or(Vec3A::Y)));
+        }
+        Mesh { positions, normals, topology: Arc::clone(&part.topology) }
+    }
+
+    /// The vector-Jacobian product of posing, from the derivatives of something by the body's posed vertices (in the order of
+    /// [`Armature::positions`]) and by its keypoints, to those by the joints' transforms; for [`Rig::transforms_vjp`].
+    pub fn transforms_gradient(&self, by_vertex: &[DVec3], by_keypoint: &[DVec3]) -> Vec<DAffine3> {
+        let zero = DAffine3 { matrix3: glam::DMat3::ZERO, translation: DVec3::ZERO };
+        let mut out = vec![zero; self.rig.joints().len()];
+        let mut add = |joint: usize, weight: f64, at: DVec3, g: DVec3| {
+            let g = g * weight;
+            let m = &mut out[joint];
+            m.matrix3 += glam::DMat3::from_cols(g * at.x, g * at.y, g * at.z);
+            m.translation += g;
+        };
+        for ((p, i), g) in self.positions.iter().zip(&self.skin.influences).zip(by_vertex) {
+            for (j, w) in i.joints.iter().zip(i.weights).filter(|(_, w)| *w > 0.0) {
+                add(usize::from(*j), f64::from(w), p.as_dvec3(), *g);
+            }
+        }
+        for (k, g) in self.rig.keypoints().iter().zip(by_keypoint) {
+            add(k.joint, 1.0, k.rest, *g);
+        }
+        out
+    }
+
+    /// The posed vertices, in the order of [`Armature::positions`]: what [`Armature::posed`] draws, whole.
+    ///
+    /// # Errors
+    /// A pose that is not finite.
+    pub fn posed_vertices(&self, pose: &[JointPose], rules: &Rules) -> Result<Vec<DVec3>, GeomError> {
+        let t = self.rig.transforms(pose, rules)?;
+        let one = |(p, i): (&Vec3, &Influence)| {
+            let terms = i.joints.iter().zip(i.weights).filter(|(_, w)| *w > 0.0);
+            terms.map(|(j, w)| t[usize::from(*j)].transform_point3(p.as_dvec3()) * f64::from(w)).sum()
+        };
+        Ok(self.positions.iter().zip(&self.skin.influences).map(one).collect())
+    }
+}
+
+fn blend(joints: &[u16; MOST_WEIGHTS], weights: &[f32; MOST_WEIGHTS], transforms: &[Affine3A]) -> Affine3A {
+    let mut m = Affine3A { matrix3: Mat3A::ZERO, translation: Vec3A::ZERO };
+    for (j, w) in joints.iter().zip(weights).take_while(|(_, w)| **w > 0.0) {
+        let t = &transforms[usize::from(*j)];
+        m.matrix3 += t.matrix3 * *w;
+        m.translation += t.translation * *w;
+    }
+    m
+}
+
+/// What takes normals along: see [`crate::geom::Affine::normal_matrix`]; here without mirrors.
+fn cofactor(m: &Mat3A) -> Mat3A {
+    Mat3A::from_cols(m.y_axis.cross(m.z_axis), m.z_axis.cross(m.x_axis), m.x_axis.cross(m.y_axis))
+}
+
+/// The parts by the joint that weighs most in each triangle; of equals, the first in rig order.
+fn parts(joints: usize, triangles: &[[u32; 3]], influences: &[Influence]) -> Vec<Part> {
+    let mut by_joint: Vec<Vec<[u32; 3]>> = vec![Vec::new(); joints];
+    let mut sums = vec![0.0f64; joints];
+    for t in triangles {
+        for v in t {
+            let i = &influences[*v as usize];
+            for (j, w) in i.joints.iter().zip(i.weights) {
+                sums[usize::from(*j)] += f64::from(w);
+            }
+        }
+        let most = (0..joints).fold(0, |most, j| if sums[j] > sums[most] { j } else { most });
+        by_joint[most].push(*t);
+        sums.fill(0.0);
+    }
+    let mut parts = Vec::new();
+    let mut own = vec![u32::MAX; influences.len()];
+    for (joint, triangles) in by_joint.iter().enumerate().filter(|(_, t)| !t.is_empty()) {
+        let mut vertices = Vec::new();
+        let faces: Vec<[u32; 3]> = triangles
+            .iter()
+            .map(|t| {
+                t.map(|v| {
+                    if own[v as usize] == u32::MAX {
+                        own[v as usize] = vertices.len() as u32;
+                        vertices.push(v);
+                    }
+                    own[v as usize]
+                })
+            })
+            .collect();
+        let mut used: Vec<u16> = Vec::new();
+        for v in &vertices {
+            own[*v as usize] = u32::MAX;
+            let i = &influences[*v as usize];
+            used.extend(i.joints.iter().zip(i.weights).filter(|(_, w)| *w > 0.0).map(|(j, _)| *j));
+        }
+        used.sort_unstable();
+        used.dedup();
+        let topology = Topology {
+            parts: vec![0; faces.len()],
+            triangles: faces,
+            part_count: 1,
+            edges: Vec::new(),
+            encloses: true,
+        };
+        parts.push(Part { joint: joint as u16, topology: Arc::new(topology), vertices, joints: used });
+    }
+    parts
+}

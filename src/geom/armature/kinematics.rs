@@ -1,0 +1,204 @@
+//! From a pose to where each joint takes the points it carries.
+//!
+//! M[j] = M[parent] T(head + d) R S T(-head), as transforms of points at rest. R turns the whole subtree; S acts on the bone's own
+//! region, and on the subtree only if asked. A location t is a *handle*: in rig order, for a joint b with t != 0, one sweep
+//! over its ancestors a, from its parent to the nearest stop (included) or the root, turns each, with its subtree, by
+//! 1 / (number of those ancestors) of the shortest arc from (p_b - p_a) to (p_b + t - p_a); what is left becomes d, so that the
+//! head of b ends at p_b + t. Positions p are those of the pose so far.
+//!
+//! A pure function of the pose: never iterated to convergence, and t = 0 changes nothing. It is smooth, except where a handle
+//! is pulled straight through an ancestor.
+
+use super::pose::Motion;
+use super::real::{M3, Real, Tape, V3, Var};
+use super::{JointPose, Rig, Rules};
+use crate::geom::GeomError;
+use glam::{DAffine3, DMat3, DVec3};
+
+/// Where a joint takes points: p' = linear p + shift.
+#[derive(Clone, Copy)]
+pub(super) struct Place<T> {
+    pub linear: M3<T>,
+    pub shift: V3<T>,
+}
+
+impl<T: Real> Place<T> {
+    fn point(&self, p: V3<T>) -> V3<T> {
+        self.linear.apply(p) + self.shift
+    }
+}
+
+/// The derivatives of something by what one joint does.
+#[derive(Clone, Copy, Debug, Default, PartialEq)]
+pub struct JointGradient {
+    /// By the location.
+    pub location: DVec3,
+    /// By the rotation vector, or the angles; for a matrix, by a small rotation vector applied after it.
+    pub turn: DVec3,
+    /// By the scale.
+    pub scale: DVec3,
+}
+
+impl Rig {
+    /// Where each joint takes points at rest, by joint in rig order. Joints beyond the end of `pose` rest.
+    ///
+    /// # Errors
+    /// A pose that is not finite.
+    pub fn transforms(&self, pose: &[JointPose], rules: &Rules) -> Result<Vec<DAffine3>, GeomError> {
+        let motions = self.motions(pose, |x| x)?;
+        let places = places(self, motions, rules, false);
+        let affine = |p: &Place<f64>| DAffine3 {
+            matrix3: DMat3::from_cols_array_2d(&p.linear.transposed().0),
+            translation: DVec3::from_array(p.shift.0),
+        };
+        Ok(places.iter().map(affine).collect())
+    }
+
+    /// The vector-Jacobian product of [`Rig::transforms`]: from the derivatives of something by each transform (matrix and
+    /// translation) to those by the pose.
+    ///
+    /// # Errors
+    /// A pose that is not finite.
+    pub fn transforms_vjp(
+        &self,
+        pose: &[JointPose],
+        rules: &Rules,
+        by_transform: &[DAffine3],
+    ) -> Result<Vec<JointGradient>, GeomError> {
+        let tape = Tape::default();
+        let mut inputs: Vec<Var> = Vec::with_capacity(self.joints().len() * 9);
+        let motions = self.motions(pose, |x| {
+            let v = tape.variable(x);
+            inputs.push(v);
+            v
+        })?;
+        let places = places(self, motions, rules, true);
+        let outputs = places.iter().zip(by_transform).flat_map(|(p, g)| {
+            let linear = p.linear.transposed().0.concat().into_iter().zip(g.matrix3.to_cols_array());
+            linear.chain(p.shift.0.into_iter().zip(g.translation.to_array())).collect::<Vec<_>>()
+        });
+        let slopes = tape.reverse(outputs);
+        let mut numbers = inputs.iter().map(|v| slopes[v.index()]);
+        let mut vector = || DVec3::from_array([(); 3].map(|()| numbers.next().unwrap_or(0.0)));
+        let one = |_| JointGradient { location: vector(), turn: vector(), scale: vector() };
+        Ok((0..self.joints().len()).map(one).collect())
+    }
+
+    fn motions<T: Real>(
+        &self,
+        pose: &[JointPose],
+        mut number: impl FnMut(f64) -> T,
+    ) -> Result<Vec<Motion<T>>, GeomError> {
+        let mut motions = Vec::with_capacity(self.joints().len());
+        for (i, joint) in self.joints().iter().enumerate() {
+            let p = pose.get(i).copied().unwrap_or(JointPose::REST);
+            p.check(&joint.name)?;
+            motions.push(p.motion(&mut number));
+        }
+        Ok(motions)
+    }
+}
+
+/// The transforms; `all` also runs handles that do not pull, for their derivatives.
+fn places<T: Real>(rig: &Rig, mut motions: Vec<Motion<T>>, rules: &Rules, all: bool) -> Vec<Place<T>> {
+    let Some(zero) = motions.first().map(|m| m.location.0[0].constant(0.0)) else { return Vec::new() };
+    let vector = |v: DVec3| V3(v.to_array().map(|x| zero.constant(x)));
+    let heads: Vec<V3<T>> = rig.joints().iter().map(|j| vector(j.head)).collect();
+    let mut pulled = vec![V3([zero; 3]); motions.len()];
+    let mut chain = Vec::new();
+    let unscaled = |motions: &[Motion<T>], pulled: &[V3<T>]| forward(rig, &heads, motions, pulled, |m| m.turn);
+    if all || motions.iter().any(|m| !m.location.is_zero()) {
+        let mut now = unscaled(&motions, &pulled);
+        for b in 0..motions.len() {
+            let t = motions[b].location;
+            if t.is_zero() && !all {
+                continue;
+            }
+            chain.clear();
+            let mut at = rig.joints()[b].parent;
+            while let Some(a) = at {
+                chain.push(a);
+                at = if rules.stops.get(a) == Some(&true) { None } else { rig.joints()[a].parent };
+            }
+            let mut p = now[b].point(heads[b]);
+            let target = p + t;
+            for a in &chain {
+                let pivot = now[*a].point(heads[*a]);
+                let q = part_of_arc(p - pivot, target - pivot, 1.0 / chain.len() as f64);
+                p = pivot + q.apply(p - pivot);
+                // The turn in the frame of the parent, which this sweep has not moved yet.
+                let local = rig.joints()[*a].parent.map_or(q, |up| {
+                    let w = now[up].linear;
+                    w.transposed().times(q).times(w)
+                });
+                motions[*a].turn = local.times(motions[*a].turn);
+            }
+            now = unscaled(&motions, &pulled);
+            let left = target - now[b].point(heads[b]);
+            pulled[b] = rig.joints()[b].parent.map_or(left, |up| now[up].linear.transposed().apply(left));
+            now = unscaled(&motions, &pulled);
+        }
+    }
+    if rules.inherit_scale {
+        return forward(rig, &heads, &motions, &pulled, |m| m.turn.scaled(m.scale));
+    }
+    let mut places = unscaled(&motions, &pulled);
+    for ((place, m), head) in places.iter_mut().zip(&motions).zip(&heads) {
+        let fixed = place.point(*head);
+        place.linear = place.linear.scaled(m.scale);
+        place.shift = fixed - place.linear.apply(*head);
+    }
+    places
+}
+
+/// The transforms along the tree, with each joint's own linear map.
+fn forward<T: Real>(
+    rig: &Rig,
+    heads: &[V3<T>],
+    motions: &[Motion<T>],
+    pulled: &[V3<T>],
+    own: impl Fn(&Motion<T>) -> M3<T>,
+) -> Vec<Place<T>> {
+    let mut places: Vec<Place<T>> = Vec::with_capacity(motions.len());
+    for (j, m) in motions.iter().enumerate() {
+        let (head, own) = (heads[j], own(m));
+        let to = head + pulled[j];
+        let (linear, fixed) = match rig.joints()[j].parent {
+            Some(up) => (places[up].linear.times(own), places[up].point(to)),
+            None => (own, to),
+        };
+        places.push(Place { linear, shift: fixed - linear.apply(head) });
+    }
+    places
+}
+
+/// The rotation by a share of the shortest arc from the direction of u to that of v.
+fn part_of_arc<T: Real>(u: V3<T>, v: V3<T>, share: f64) -> M3<T> {
+    // Only directions matter: lengths near 1 keep squares from overflowing, and their derivatives are 0.
+    let unit = |v: V3<T>| {
+        let longest = v.0.iter().fold(0.0, |m: f64, x| m.max(x.value().abs()));
+        if longest > 0.0 && longest.is_finite() { v.scale(v.0[0].constant(1.0 / longest)) } else { v }
+    };
+    let (u, v) = (unit(u), unit(v));
+    let (w, c) = (u.cross(v), u.dot(v));
+    let square = w.dot(w);
+    let (s2, cv) = (square.value(), c.value());
+    let vector = if s2 > 1e-16 * cv * cv {
+        let s = square.sqrt();
+        w.scale(s.atan2(c) * s.recip() * c.constant(share))
+    } else if cv > 0.0 {
+        // angle / sin -> 1 / cos.
+        w.scale(c.recip() * c.constant(share))
+    } else if cv < 0.0 {
+        // Straight back: about a fixed axis at right angles to u.
+        let axis = DVec3::from_array(u.0.map(Real::value)).any_orthonormal_vector() * (std::f64::consts::PI * share);
+        V3(axis.to_array().map(|x| c.constant(x)))
+    } else {
+        w
+    };
+    M3::from_rotation_vector(vector)
+}
+
+#[cfg(test)]
+#[path = "kinematics_tests.rs"]
+mod tests;

@@ -1,0 +1,17 @@
+//! Armatures: trees of joints that move a mesh, as in Kulkarni et al. 2014, section 2.1.2.
+
+mod body;
+mod kinematics;
+mod morph;
+mod pose;
+mod real;
+mod recent;
+mod rig;
+mod rig_json;
+
+pub use body::{Armature, Influence, MOST_WEIGHTS};
+pub use kinematics::JointGradient;
+pub use morph::Morph;
+pub use pose::{JointPose, Rules, Turn};
+pub use rig::{Joint, Keypoint, MOST_JOINTS, NamedJoint, Rig};
+pub use rig_json::{RigFile, morphs_from_json, rig_from_json};

@@ -1,0 +1,56 @@
+//! Morphs: linear offsets of a body's shape at rest, added up before it is posed (a blend shape).
+
+use super::rig::{Keypoint, Rig};
+use crate::geom::GeomError;
+use glam::{DVec3, Vec3};
+use std::sync::Arc;
+
+/// Offsets for every vertex and joint at rest, in the mesh's units; an amount of 1 adds them once.
+#[derive(Clone, Debug, PartialEq)]
+pub struct Morph {
+    /// Its name.
+    pub name: Arc<str>,
+    /// By vertex.
+    pub vertices: Vec<Vec3>,
+    /// By joint in rig order: the head's.
+    pub heads: Vec<DVec3>,
+    /// By joint in rig order: the tail's.
+    pub tails: Vec<DVec3>,
+}
+
+impl Morph {
+    pub(super) fn check(&self, vertices: usize, joints: usize) -> Result<(), GeomError> {
+        let counts = [self.vertices.len(), self.heads.len(), self.tails.len()];
+        if counts != [vertices, joints, joints] {
+            return Err(GeomError::invalid(format!(
+                "the morph `{}` moves {} vertices, {} heads and {} tails; the body has {vertices}, {joints} and {joints}",
+                self.name, counts[0], counts[1], counts[2]
+            )));
+        }
+        let finite =
+            self.vertices.iter().all(|v| v.is_finite()) && self.heads.iter().chain(&self.tails).all(|v| v.is_finite());
+        if finite { Ok(()) } else { Err(GeomError::invalid(format!("the morph `{}` is not finite", self.name))) }
+    }
+
+    pub(super) fn add(&self, amount: f64, positions: &mut [Vec3], heads: &mut [DVec3], tails: &mut [DVec3]) {
+        for (p, d) in positions.iter_mut().zip(&self.vertices) {
+            *p += *d * amount as f32;
+        }
+        for (at, d) in heads.iter_mut().zip(&self.heads).chain(tails.iter_mut().zip(&self.tails)) {
+            *at += *d * amount;
+        }
+    }
+
+    /// The offset of a keypoint: its joint's where it sits on the head, else that of the nearest vertex.
+    pub(super) fn at_keypoint(&self, rig: &Rig, positions: &[Vec3], k: &Keypoint) -> DVec3 {
+        let head = rig.joints().get(k.joint).map_or(DVec3::INFINITY, |j| j.head);
+        if (head - k.rest).length() < 1e-4 {
+            return self.heads.get(k.joint).copied().unwrap_or_default();
+        }
+        let near = positions.iter().zip(&self.vertices).min_by(|(a, _), (b, _)| {
+            let d = |p: &Vec3| (p.as_dvec3() - k.rest).length_squared();
+            d(a).total_cmp(&d(b))
+        });
+        near.map_or(DVec3::ZERO, |(_, d)| d.as_dvec3())
+    }
+}

@@ -1,0 +1,55 @@
+//! The meshes of the last poses of each thread, by part: a pose that moves a part as one of them did shares its mesh.
+//!
+//! Only saves work: what it gives equals what would be made. Sharing matters to renderers, which keep what they drew of a mesh.
+
+use super::Armature;
+use crate::geom::Mesh;
+use glam::Affine3A;
+use std::cell::RefCell;
+use std::sync::{Arc, Weak};
+
+/// Bodies remembered, and poses of each part: the present one and what a few proposals tried.
+const BODIES: usize = 4;
+const POSES: usize = 4;
+
+/// What moved a part, and the mesh it made.
+type Moved = (Vec<Affine3A>, Arc<Mesh>);
+
+struct Known {
+    body: Weak<Armature>,
+    /// By part, the latest first.
+    parts: Vec<Vec<Moved>>,
+}
+
+thread_local! {
+    static KNOWN: RefCell<Vec<Known>> = const { RefCell::new(Vec::new()) };
+}
+
+/// The mesh of each part under the transforms of all joints.
+pub(super) fn meshes(body: &Arc<Armature>, transforms: &[Affine3A]) -> Vec<Arc<Mesh>> {
+    KNOWN.with_borrow_mut(|known| {
+        match known.iter().position(|k| std::ptr::eq(k.body.as_ptr(), Arc::as_ptr(body))) {
+            Some(i) => known[..=i].rotate_right(1),
+            None => {
+                known.retain(|k| k.body.strong_count() > 0);
+                known.truncate(BODIES - 1);
+                let parts = body.parts().iter().map(|_| Vec::with_capacity(POSES)).collect();
+                known.insert(0, Known { body: Arc::downgrade(body), parts });
+            }
+        }
+        let parts = body.parts().iter().zip(&mut known[0].parts);
+        parts
+            .map(|(part, poses)| {
+                let own = || part.joints.iter().map(|j| &transforms[usize::from(*j)]);
+                match poses.iter().position(|(moved, _)| moved.iter().eq(own())) {
+                    Some(i) => poses[..=i].rotate_right(1),
+                    None => {
+                        poses.truncate(POSES - 1);
+                        poses.insert(0, (own().copied().collect(), Arc::new(body.skinned(part, transforms))));
+                    }
+                }
+                Arc::clone(&poses[0].1)
+            })
+            .collect()
+    })
+}

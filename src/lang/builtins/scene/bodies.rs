@@ -1,0 +1,176 @@
+//! Bodies: armatures in a shape and a pose.
+
+use super::shapes::vector_of;
+use super::{ARMATURE, AffineValue, ArmatureValue, SOLID, SolidValue, fault, native};
+use crate::geom::armature::{Armature, JointPose, Rules, Turn};
+use crate::lang::builtins::{Args, Builtin, Type, arg, opt};
+use crate::lang::error::Fault;
+use crate::lang::value::{Record, Value};
+use glam::{DMat3, DVec3};
+use std::sync::Arc;
+
+const SECTION: &str = "Bodies";
+const BODY: &str = "an armature";
+
+pub(super) const TABLE: &[Builtin] = &[
+    native(
+        "skin",
+        SECTION,
+        &[
+            arg("rig", ARMATURE, "The armature."),
+            arg(
+                "pose",
+                Type::Any,
+                "By joint, in rig order or by name: a placement, a rotation vector, or a record with some of `rotvec`, \
+                 `rotate`, `location`, `scale`; or one array with three numbers of a rotation vector for each joint.",
+            )
+            .unit("radians; the mesh's units"),
+            opt("stop_at", Type::Array, "[]", "Joints at which the pull of a location below them ends."),
+            opt("inherit_scale", Type::Bool, "false", "Whether a joint's scale acts on the joints below it."),
+        ],
+        SOLID,
+        "The armature's mesh in a pose: M[j] = M[parent] T(head + d) R S T(-head). A location is a handle that turns the \
+         joint's ancestors, up to the next of `stop_at`, by equal shares towards it; the rest moves the joint itself.",
+        |a| {
+            let body = armature(a)?;
+            let rules = Rules { stops: stops(a, body)?, inherit_scale: a.bool_or(3, false)? };
+            let pose = pose(a, body)?;
+            body.posed(&pose, &rules).map(|s| Value::object(SolidValue(s))).map_err(fault)
+        },
+    ),
+    native(
+        "shaped",
+        SECTION,
+        &[
+            arg("rig", ARMATURE, "The armature."),
+            arg("morphs", Type::Record, "How much of each of its morphs is added: 1 is the morph itself."),
+        ],
+        ARMATURE,
+        "The armature with its shape at rest changed by linear offsets, such as `{ tall: 0.5 }`.",
+        |a| {
+            let body = armature(a)?;
+            let Value::Record(amounts) = a.get(1) else { return Err(a.wrong(1, "a record of numbers")) };
+            let mut list = Vec::with_capacity(amounts.len());
+            for (name, v) in amounts.iter() {
+                let Value::Num(x) = v else { return Err(a.element_wrong(1, "a record of numbers", v)) };
+                if !body.morphs().any(|m| *m == **name) {
+                    let f = Fault::type_error(format!("scene.shaped: the armature has no morph `{name}`"));
+                    return Err(nearest_of(f, name, body.morphs()));
+                }
+                list.push((&**name, *x));
+            }
+            body.shaped(&list).map(|b| Value::object(ArmatureValue(Arc::new(b)))).map_err(fault)
+        },
+    ),
+];
+
+fn armature<'a>(a: &Args<'a>) -> Result<&'a Arc<Armature>, Fault> {
+    a.object::<ArmatureValue>(0, BODY).map(|v| &v.0)
+}
+
+fn nearest_of<'a>(f: Fault, name: &str, known: impl Iterator<Item = &'a str> + Clone) -> Fault {
+    match crate::diag::nearest(name, known.clone()) {
+        Some(near) => f.with_hint(format!("did you mean `{near}`?")),
+        None => f.with_hint(format!("it has {}", known.collect::<Vec<_>>().join(", "))),
+    }
+}
+
+/// The index of a joint of the argument's rig.
+fn joint(a: &Args, body: &Armature, name: &str) -> Result<usize, Fault> {
+    body.rig().find(name).ok_or_else(|| {
+        let f = Fault::type_error(format!("{}: the rig has no joint `{name}`", a.builtin.full_name()));
+        nearest_of(f, name, body.rig().joints().iter().map(|j| &*j.name))
+    })
+}
+
+fn stops(a: &Args, body: &Armature) -> Result<Vec<bool>, Fault> {
+    let mut stops = Vec::new();
+    if !a.given(2) {
+        return Ok(stops);
+    }
+    stops.resize(body.rig().joints().len(), false);
+    for i in 0..a.get(2).len().unwrap_or(0) {
+        match a.get(2).element(i).unwrap_or_default() {
+            Value::Str(name) => stops[joint(a, body, &name)?] = true,
+            v => return Err(a.element_wrong(2, "an array of joints' names", &v)),
+        }
+    }
+    Ok(stops)
+}
+
+fn pose(a: &Args, body: &Armature) -> Result<Vec<JointPose>, Fault> {
+    let count = body.rig().joints().len();
+    match a.get(1) {
+        Value::Array(xs) if xs.is_empty() => Ok(Vec::new()),
+        Value::Array(xs) => {
+            if xs.len() != 3 * count {
+                return Err(a.wrong_length(1, &format!("three numbers for each of the {count} joints")));
+            }
+            Ok(xs.chunks_exact(3).map(|v| JointPose::turned(DVec3::from_slice(v))).collect())
+        }
+        Value::List(all) => {
+            if all.len() != count {
+                return Err(a.wrong_length(1, &format!("one element for each of the {count} joints")));
+            }
+            all.iter().map(|v| one(a, v)).collect()
+        }
+        Value::Record(by_name) => {
+            let mut pose = vec![JointPose::REST; count];
+            for (name, v) in by_name.iter() {
+                pose[joint(a, body, name)?] = one(a, v)?;
+            }
+            Ok(pose)
+        }
+        _ => Err(a.wrong(1, "the poses of joints")),
+    }
+}
+
+const WANTED: &str = "a placement, a rotation vector, or a record with `rotvec`, `rotate`, `location`, `scale`";
+
+/// What one joint does.
+fn one(a: &Args, v: &Value) -> Result<JointPose, Fault> {
+    if let Some(placement) = v.downcast::<AffineValue>() {
+        return affine(a, placement);
+    }
+    match v {
+        Value::Unit => Ok(JointPose::REST),
+        Value::Array(_) => vector_of(v).map(JointPose::turned).ok_or_else(|| a.element_wrong(1, WANTED, v)),
+        Value::Record(fields) => record(a, fields),
+        _ => Err(a.element_wrong(1, WANTED, v)),
+    }
+}
+
+/// The parts of a placement without shear: its scale acts first.
+fn affine(a: &Args, placement: &AffineValue) -> Result<JointPose, Fault> {
+    let m = placement.0.0.matrix3;
+    let scale = DVec3::new(m.x_axis.length(), m.y_axis.length(), m.z_axis.length());
+    let turn = DMat3::from_cols(m.x_axis / scale.x, m.y_axis / scale.y, m.z_axis / scale.z);
+    let off = (turn.transpose() * turn - DMat3::IDENTITY).to_cols_array().iter().fold(0.0, |m: f64, x| m.max(x.abs()));
+    // Also where a scale is 0 and `off` no number.
+    if !(off < 1e-9 && turn.determinant() > 0.0) {
+        let name = a.builtin.full_name();
+        return Err(Fault::domain(format!("{name}: a joint's placement must turn and stretch, not shear or mirror")));
+    }
+    Ok(JointPose { location: placement.0.0.translation, turn: Turn::Matrix(turn), scale })
+}
+
+fn record(a: &Args, fields: &Record) -> Result<JointPose, Fault> {
+    let mut pose = JointPose::REST;
+    for (name, v) in fields {
+        let of = vector_of(v).ok_or_else(|| a.element_wrong(1, WANTED, v))?;
+        match &**name {
+            "rotvec" => pose.turn = Turn::Vector(of),
+            "rotate" => pose.turn = Turn::Angles(of),
+            "location" => pose.location = of,
+            "scale" => pose.scale = of,
+            _ => {
+                let f = Fault::type_error(format!("scene.skin: a joint's pose has no field `{name}`"));
+                return Err(nearest_of(f, name, ["rotvec", "rotate", "location", "scale"].into_iter()));
+            }
+        }
+    }
+    if fields.contains_key("rotvec") && fields.contains_key("rotate") {
+        return Err(Fault::type_error("scene.skin: a joint's pose has either `rotvec` or `rotate`"));
+    }
+    Ok(pose)
+}
