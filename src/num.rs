@@ -4,6 +4,7 @@
 mod exact;
 mod saddle;
 mod special;
+mod tails;
 
 pub use exact::ExactSum;
 pub use saddle::{deviance, stirling_error};
@@ -11,3 +12,4 @@ pub use special::{
     LN_SQRT_2PI, digamma, expit, inv_normal_cdf, ln_beta, ln_choose, ln_factorial, ln_gamma, log_diff_exp,
     log_normal_cdf, log_sum_exp, log1p_exp, logit, normal_cdf,
 };
+pub use tails::{bessel_deficit, log_scaled_i0, mills_ratio};

@@ -17,11 +17,25 @@ pub enum Dist {
     HalfNormal(HalfNormal),
     HalfCauchy(HalfCauchy),
     StudentT(StudentT),
+    InvGamma(InvGamma),
+    Cauchy(Cauchy),
+    Laplace(Laplace),
+    VonMises(VonMises),
+    Weibull(Weibull),
+    NegBinomial(NegBinomial),
+    Geometric(Geometric),
+    Flat(Flat),
     Flip(Flip),
     UniformDiscrete(UniformDiscrete),
     Binomial(Binomial),
     Poisson(Poisson),
     Categorical(Arc<Categorical>),
+    TruncatedNormal(Arc<TruncatedNormal>),
+    Multinomial(Arc<Multinomial>),
+    Lkj(Arc<Lkj>),
+    Wishart(Arc<Wishart>),
+    Ordered(Arc<Ordered>),
+    Mixture(Arc<Mixture>),
     Dirichlet(Arc<Dirichlet>),
     MvNormal(Arc<MvNormal>),
     Gp(Arc<Gp>),
@@ -46,6 +60,20 @@ macro_rules! each {
             Dist::HalfNormal($d) => $body,
             Dist::HalfCauchy($d) => $body,
             Dist::StudentT($d) => $body,
+            Dist::InvGamma($d) => $body,
+            Dist::Cauchy($d) => $body,
+            Dist::Laplace($d) => $body,
+            Dist::VonMises($d) => $body,
+            Dist::Weibull($d) => $body,
+            Dist::NegBinomial($d) => $body,
+            Dist::Geometric($d) => $body,
+            Dist::Flat($d) => $body,
+            Dist::TruncatedNormal($d) => $body,
+            Dist::Multinomial($d) => $body,
+            Dist::Lkj($d) => $body,
+            Dist::Wishart($d) => $body,
+            Dist::Ordered($d) => $body,
+            Dist::Mixture($d) => $body,
             Dist::Flip($d) => $body,
             Dist::UniformDiscrete($d) => $body,
             Dist::Binomial($d) => $body,
@@ -89,6 +117,8 @@ impl Dist {
         colour(z: &[f64]) -> Option<Datum>;
         /// See [`Distribution::is_scalar`].
         is_scalar() -> bool;
+        /// See [`Distribution::is_improper`].
+        is_improper() -> bool;
         /// See [`Distribution::is_stored_whitened`].
         is_stored_whitened() -> bool;
         /// See [`Distribution::sample_stored`].
@@ -157,6 +187,7 @@ impl Dist {
     pub(super) fn centred(self) -> Dist {
         match self {
             Dist::Gp(d) if d.is_stored_whitened() => Dist::Gp(Arc::new(d.to_centred())),
+            Dist::MvNormal(d) if d.is_stored_whitened() => Dist::MvNormal(Arc::new(d.to_centred())),
             other => other,
         }
     }

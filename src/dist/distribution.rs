@@ -53,6 +53,12 @@ pub trait Distribution: fmt::Debug + Send + Sync {
         self.support().is_number()
     }
 
+    /// Whether it has no integral, so that nothing can be drawn from it: a density of 1 everywhere. Its `sample` gives a place to
+    /// start a chain from.
+    fn is_improper(&self) -> bool {
+        false
+    }
+
     /// Whether the stored form is white noise.
     fn is_stored_whitened(&self) -> bool {
         false

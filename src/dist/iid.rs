@@ -80,4 +80,8 @@ impl Distribution for Iid {
     fn is_scalar(&self) -> bool {
         false
     }
+
+    fn is_improper(&self) -> bool {
+        self.one.is_improper()
+    }
 }

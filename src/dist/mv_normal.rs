@@ -1,18 +1,17 @@
 //! The multivariate normal distribution.
 
+use super::ParamError;
 use super::factor::{Factor, lower};
+use super::gaussian::{Gaussian, gaussian_family};
 use super::param::finite;
-use super::{Datum, Distribution, Gradient, ParamError, Support};
-use crate::num::LN_SQRT_2PI;
-use crate::rng::Stream;
 use nalgebra::DMatrix;
 
 /// `mv_normal(mean, cov)` or `mv_normal(mean, chol)`. Gradients are by the mean only.
+///
+/// Its choice is stored as its value; a whitened one stores the white noise z of mean + chol z, so that the value follows when the
+/// mean and the covariance move.
 #[derive(Clone, Debug, PartialEq)]
-pub struct MvNormal {
-    mean: Box<[f64]>,
-    factor: Factor,
-}
+pub struct MvNormal(Gaussian);
 
 impl MvNormal {
     /// With this mean and covariance; fails unless the mean is finite and the covariance as large, symmetric (to 1e-9 of its
@@ -51,7 +50,17 @@ impl MvNormal {
         for m in mean {
             finite("mv_normal", "mean", *m)?;
         }
-        Ok(MvNormal { mean: mean.into(), factor })
+        Ok(MvNormal(Gaussian { mean: mean.into(), factor, whitened: false }))
+    }
+
+    /// The same distribution, storing white noise.
+    pub fn to_whitened(&self) -> MvNormal {
+        MvNormal(Gaussian { whitened: true, ..self.0.clone() })
+    }
+
+    /// The same distribution, storing values.
+    pub fn to_centred(&self) -> MvNormal {
+        MvNormal(self.0.centred())
     }
 }
 
@@ -59,73 +68,4 @@ fn shape(m: &DMatrix<f64>) -> String {
     format!("{} x {}", m.nrows(), m.ncols())
 }
 
-/// The log density of x = mean + L z.
-pub(super) fn score(factor: &Factor, mean: &[f64], x: &Datum) -> f64 {
-    let score = x.with_numbers(factor.size(), |x| {
-        if x.iter().any(|x| !x.is_finite()) {
-            return f64::NEG_INFINITY;
-        }
-        standard_score(&factor.whiten(mean, x)) - factor.log_det()
-    });
-    score.filter(|s| !s.is_nan()).unwrap_or(f64::NEG_INFINITY)
-}
-
-/// The log density of standard normal noise.
-pub(super) fn standard_score(z: &[f64]) -> f64 {
-    let square: f64 = z.iter().map(|z| z * z).sum();
-    -0.5 * square - LN_SQRT_2PI * z.len() as f64
-}
-
-/// The derivatives of [`score`] by the value and by the mean.
-pub(super) fn slopes(factor: &Factor, mean: &[f64], x: &Datum) -> Option<Gradient> {
-    if !score(factor, mean, x).is_finite() {
-        return None;
-    }
-    let by_mean = x.with_numbers(factor.size(), |x| factor.solve_transposed(factor.whiten(mean, x)))?;
-    Some(Gradient { x: by_mean.iter().map(|g| -g).collect(), params: by_mean })
-}
-
-/// mean + L z for fresh noise.
-pub(super) fn draw(factor: &Factor, mean: &[f64], rng: &mut Stream) -> Datum {
-    let z: Vec<f64> = mean.iter().map(|_| rng.standard_normal()).collect();
-    factor.colour(mean, &z).into()
-}
-
-/// The noise behind a finite vector.
-pub(super) fn whiten(factor: &Factor, mean: &[f64], x: &Datum) -> Option<Vec<f64>> {
-    x.with_numbers(factor.size(), |x| factor.whiten(mean, x)).filter(|z| z.iter().all(|z| z.is_finite()))
-}
-
-impl Distribution for MvNormal {
-    fn name(&self) -> &'static str {
-        "mv_normal"
-    }
-
-    fn support(&self) -> Support {
-        Support::Vector(self.mean.len())
-    }
-
-    fn sample(&self, rng: &mut Stream) -> Datum {
-        draw(&self.factor, &self.mean, rng)
-    }
-
-    fn log_density(&self, x: &Datum) -> f64 {
-        score(&self.factor, &self.mean, x)
-    }
-
-    fn gradient(&self, x: &Datum) -> Option<Gradient> {
-        slopes(&self.factor, &self.mean, x)
-    }
-
-    fn is_gaussian(&self) -> bool {
-        true
-    }
-
-    fn whiten(&self, x: &Datum) -> Option<Vec<f64>> {
-        whiten(&self.factor, &self.mean, x)
-    }
-
-    fn colour(&self, z: &[f64]) -> Option<Datum> {
-        (z.len() == self.mean.len()).then(|| self.factor.colour(&self.mean, z).into())
-    }
-}
+gaussian_family!(MvNormal, "mv_normal");

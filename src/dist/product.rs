@@ -71,6 +71,10 @@ impl Distribution for Product {
     fn is_scalar(&self) -> bool {
         false
     }
+
+    fn is_improper(&self) -> bool {
+        self.parts.iter().any(Dist::is_improper)
+    }
 }
 
 /// The sum of log densities: impossible if one element is.

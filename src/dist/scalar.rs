@@ -31,6 +31,9 @@ pub trait Scalar: fmt::Debug + Send + Sync {
     /// The name in the language.
     const NAME: &'static str;
 
+    /// Whether it has no integral, see [`Distribution::is_improper`].
+    const IMPROPER: bool = false;
+
     /// The space of its values: one of numbers.
     fn number_support(&self) -> Support;
 
@@ -92,6 +95,10 @@ impl<T: Scalar> Distribution for T {
 
     fn is_scalar(&self) -> bool {
         true
+    }
+
+    fn is_improper(&self) -> bool {
+        T::IMPROPER
     }
 
     fn is_gaussian(&self) -> bool {

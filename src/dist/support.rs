@@ -1,6 +1,7 @@
 //! The spaces that values live in. How they map to unconstrained space is in `transform.rs`.
 
-use super::Datum;
+use super::{Datum, triangle};
+use core::f64::consts::{PI, TAU};
 use std::sync::Arc;
 
 /// Up to this many values are enumerated; a larger set counts as infinite.
@@ -28,6 +29,13 @@ pub enum Support {
         /// The upper bound.
         hi: f64,
     },
+    /// At or below a bound.
+    AtMost {
+        /// The bound.
+        hi: f64,
+    },
+    /// Angles in radians, in (-pi, pi]. The unconstrained coordinate is the angle, over which the density goes on periodically.
+    Circle,
     /// Truth values.
     Boolean,
     /// Integers from `lo`, up to `hi` if there is one.
@@ -41,6 +49,20 @@ pub enum Support {
     Simplex(usize),
     /// Vectors of so many finite numbers.
     Vector(usize),
+    /// So many numbers of one continuous space in ascending order; equal neighbours are its boundary.
+    Ascending(Box<Support>, usize),
+    /// Cholesky factors of correlation matrices with so many rows: n rows of n numbers, zeros above a diagonal that is not
+    /// negative, every row of length 1.
+    CorrelationFactor(usize),
+    /// Cholesky factors of covariance matrices with so many rows: zeros above a positive diagonal.
+    CovarianceFactor(usize),
+    /// Counts for so many kinds that sum to a total.
+    Counts {
+        /// The total.
+        total: i64,
+        /// How many kinds.
+        kinds: usize,
+    },
     /// So many values of one space.
     Product(Box<Support>, usize),
     /// One value of each of these spaces.
@@ -51,13 +73,13 @@ impl Support {
     /// Whether its values are single numbers.
     pub fn is_number(&self) -> bool {
         use Support::*;
-        matches!(self, Real | Positive | AtLeast { .. } | Interval { .. } | Integers { .. })
+        matches!(self, Real | Positive | AtLeast { .. } | AtMost { .. } | Interval { .. } | Circle | Integers { .. })
     }
 
     /// Whether its values can be counted. A product is discrete if all of its parts are.
     pub fn is_discrete(&self) -> bool {
         match self {
-            Support::Boolean | Support::Integers { .. } => true,
+            Support::Boolean | Support::Integers { .. } | Support::Counts { .. } => true,
             Support::Product(one, _) => one.is_discrete(),
             Support::Each(all) => all.iter().all(Support::is_discrete),
             _ => false,
@@ -88,7 +110,10 @@ impl Support {
     pub fn fits(&self, x: &Datum) -> bool {
         match self {
             Support::Boolean => matches!(x, Datum::Bool(_)),
-            Support::Simplex(n) | Support::Vector(n) => x.with_numbers(*n, |_| ()).is_some(),
+            Support::Simplex(n) | Support::Vector(n) | Support::Ascending(_, n) | Support::Counts { kinds: n, .. } => {
+                x.with_numbers(*n, |_| ()).is_some()
+            }
+            Support::CorrelationFactor(n) | Support::CovarianceFactor(n) => triangle::entries(x, *n).is_some(),
             Support::Product(one, n) => match x {
                 Datum::Vec(xs) => xs.len() == *n && one.is_number(),
                 Datum::List(xs) => xs.len() == *n && xs.iter().all(|x| one.fits(x)),
@@ -111,6 +136,8 @@ impl Support {
             Support::Positive => x > 0.0 && x.is_finite(),
             Support::AtLeast { lo } => x >= *lo && x.is_finite(),
             Support::Interval { lo, hi } => (*lo..=*hi).contains(&x),
+            Support::AtMost { hi } => x <= *hi && x.is_finite(),
+            Support::Circle => x > -PI && x <= PI,
             Support::Integers { lo, hi } => {
                 x.is_finite() && x == libm::trunc(x) && x >= *lo as f64 && hi.is_none_or(|hi| x <= hi as f64)
             }
@@ -125,6 +152,19 @@ impl Support {
             (Support::Boolean, Datum::Bool(_)) => true,
             (Support::Simplex(n), _) => x.with_numbers(*n, is_simplex).unwrap_or(false),
             (Support::Vector(n), _) => x.with_numbers(*n, |xs| xs.iter().all(|x| x.is_finite())).unwrap_or(false),
+            (Support::Ascending(one, n), _) => {
+                let inside = |xs: &[f64]| is_ascending(xs) && xs.iter().all(|x| one.contains_num(*x));
+                x.with_numbers(*n, inside).unwrap_or(false)
+            }
+            (Support::Counts { total, kinds }, _) => {
+                x.with_numbers(*kinds, |xs| are_counts(xs, *total)).unwrap_or(false)
+            }
+            (Support::CorrelationFactor(n), _) => {
+                triangle::entries(x, *n).is_some_and(|xs| triangle::is_correlation_factor(&xs, *n))
+            }
+            (Support::CovarianceFactor(n), _) => {
+                triangle::entries(x, *n).is_some_and(|xs| triangle::is_covariance_factor(&xs, *n))
+            }
             (Support::Product(one, n), Datum::Vec(xs)) => xs.len() == *n && xs.iter().all(|x| one.contains_num(*x)),
             (Support::Product(one, n), Datum::List(xs)) => xs.len() == *n && xs.iter().all(|x| one.contains(x)),
             (Support::Each(all), Datum::Vec(xs)) => {
@@ -141,4 +181,27 @@ impl Support {
 /// Whether these are shares of 1, but for rounding.
 pub(super) fn is_simplex(xs: &[f64]) -> bool {
     xs.iter().all(|x| (0.0..=1.0).contains(x)) && (xs.iter().sum::<f64>() - 1.0).abs() <= SIMPLEX_TOLERANCE
+}
+
+/// Whether every number is at least the one before it.
+pub(super) fn is_ascending(xs: &[f64]) -> bool {
+    xs.windows(2).all(|w| w[0] <= w[1])
+}
+
+/// Whether these are whole numbers from 0 with this sum.
+pub(super) fn are_counts(xs: &[f64], total: i64) -> bool {
+    let count = |x: &f64| *x >= 0.0 && *x <= total as f64 && *x == libm::trunc(*x);
+    xs.iter().all(count) && xs.iter().map(|x| i128::from(*x as i64)).sum::<i128>() == i128::from(total)
+}
+
+/// The same direction in (-pi, pi]; 0 for what is not a finite number.
+pub(super) fn wrap_angle(x: f64) -> f64 {
+    let x = if x.abs() <= PI { x } else { libm::remainder(x, TAU) };
+    if x.is_nan() {
+        0.0
+    } else if x <= -PI {
+        PI
+    } else {
+        x.min(PI)
+    }
 }

@@ -1,18 +1,19 @@
 //! The maps between supports and unconstrained space: the identity, log, logit and stick-breaking, as in the Stan reference
-//! manual ("Constraint transforms").
+//! manual ("Constraint transforms"). Those of matrices are in `triangle.rs`, those of sorted numbers in `ascending.rs`.
 //!
 //! Points on a boundary, and points that left a support whose bounds moved, map as the nearest points inside: coordinates are
 //! always finite. Whatever comes back is strictly inside.
 
-use super::{Datum, Support};
+use super::support::wrap_angle;
+use super::{Datum, Support, ascending, triangle};
 use crate::num::log1p_exp;
 
 /// Coordinates beyond this are no longer told apart: e^-700 is near the smallest double.
-const FAR: f64 = 700.0;
+pub(super) const FAR: f64 = 700.0;
 
 /// The coordinate within those told apart; 0 for NaN.
 #[inline]
-fn near(y: f64) -> f64 {
+pub(super) fn near(y: f64) -> f64 {
     if y.is_nan() { 0.0 } else { y.clamp(-FAR, FAR) }
 }
 
@@ -20,18 +21,21 @@ impl Support {
     /// The dimension of the unconstrained space; 0 for discrete values.
     pub fn free_dim(&self) -> usize {
         match self {
-            Support::Boolean | Support::Integers { .. } => 0,
+            Support::Boolean | Support::Integers { .. } | Support::Counts { .. } => 0,
             Support::Simplex(n) => n.saturating_sub(1),
-            Support::Vector(n) => *n,
+            Support::Vector(n) | Support::Ascending(_, n) => *n,
+            Support::CorrelationFactor(n) => n * n.saturating_sub(1) / 2,
+            Support::CovarianceFactor(n) => n * (n + 1) / 2,
             Support::Product(one, n) => one.free_dim() * n,
             Support::Each(all) => all.iter().map(Support::free_dim).sum(),
             _ => 1,
         }
     }
 
-    /// How many numbers a gradient by the value has: those of the continuous parts.
+    /// How many numbers a gradient by the value has: those of the continuous parts, of a matrix row by row.
     pub fn gradient_dim(&self) -> usize {
         match self {
+            Support::CorrelationFactor(n) | Support::CovarianceFactor(n) => n * n,
             Support::Simplex(n) => *n,
             Support::Product(one, n) => one.gradient_dim() * n,
             Support::Each(all) => all.iter().map(Support::gradient_dim).sum(),
@@ -46,6 +50,8 @@ impl Support {
             Support::Real => return if x.is_nan() { 0.0 } else { x.clamp(f64::MIN, f64::MAX) },
             Support::Positive => libm::log(x),
             Support::AtLeast { lo } => libm::log(x - lo),
+            Support::AtMost { hi } => libm::log(hi - x),
+            Support::Circle => return wrap_angle(x),
             Support::Interval { lo, hi } => libm::log(x - lo) - libm::log(hi - x),
             _ => return 0.0,
         };
@@ -71,6 +77,11 @@ impl Support {
                 let y = near(y);
                 ((lo + libm::exp(y)).clamp(lo.next_up(), f64::MAX), y)
             }
+            Support::AtMost { hi } => {
+                let y = near(y);
+                ((hi - libm::exp(y)).clamp(f64::MIN, hi.next_down()), y)
+            }
+            Support::Circle => (wrap_angle(y), 0.0),
             Support::Interval { lo, hi } => {
                 let (width, y) = (hi - lo, near(y));
                 let share = libm::exp(-log1p_exp(y.abs()));
@@ -92,6 +103,15 @@ impl Support {
             (Support::Simplex(n), _) => {
                 x.with_numbers(*n, |xs| stick_lengths(xs, out));
             }
+            (Support::Ascending(one, n), _) => {
+                x.with_numbers(*n, |xs| ascending::to_free(one, xs, out));
+            }
+            (Support::CorrelationFactor(n), _) => {
+                triangle::entries(x, *n).iter().for_each(|xs| triangle::correlation_to_free(xs, *n, out));
+            }
+            (Support::CovarianceFactor(n), _) => {
+                triangle::entries(x, *n).iter().for_each(|xs| triangle::covariance_to_free(xs, *n, out));
+            }
             (Support::Product(one, n), Datum::Vec(xs)) if one.is_number() && one.free_dim() == 1 => {
                 out.extend(xs.iter().take(*n).map(|x| one.to_free_scalar(*x)));
             }
@@ -110,13 +130,25 @@ impl Support {
         out.resize(end, 0.0);
     }
 
-    /// The value at a point of unconstrained space, and log |dx/dy| there (for a simplex, of all shares but the last). Missing
+    /// The value at a point of unconstrained space, and log |dx/dy| there (for a simplex, of all shares but the last; for a
+    /// Cholesky factor, of its lower triangle, of a correlation matrix without the diagonal). Missing
     /// coordinates count as 0. A discrete part is at its least value.
     pub fn from_free(&self, y: &[f64]) -> (Datum, f64) {
         let at = |i: usize| y.get(i).copied().unwrap_or(0.0);
         match self {
             Support::Boolean => (Datum::Bool(false), 0.0),
             Support::Integers { lo, .. } => (Datum::Num(*lo as f64), 0.0),
+            Support::Counts { total, kinds } => {
+                let mut counts = vec![0.0; *kinds];
+                counts.iter_mut().take(1).for_each(|c| *c = *total as f64);
+                (counts.into(), 0.0)
+            }
+            Support::Ascending(one, n) => {
+                let (x, jacobian) = ascending::from_free(one, *n, at);
+                (x.into(), jacobian)
+            }
+            Support::CorrelationFactor(n) => triangle::correlation_from_free(*n, at),
+            Support::CovarianceFactor(n) => triangle::covariance_from_free(*n, at),
             Support::Vector(n) => {
                 ((0..*n).map(|i| Support::Real.from_free_scalar(at(i)).0).collect::<Vec<_>>().into(), 0.0)
             }
@@ -149,10 +181,14 @@ impl Support {
         let at = |i: usize| y.get(i).copied().unwrap_or(0.0);
         let by = |i: usize| by_x.get(i).copied().unwrap_or(0.0);
         match self {
-            Support::Boolean | Support::Integers { .. } => {}
-            Support::Real => out.push(by(0)),
+            Support::Boolean | Support::Integers { .. } | Support::Counts { .. } => {}
+            Support::Real | Support::Circle => out.push(by(0)),
             Support::Vector(n) => out.extend((0..*n).map(by)),
             Support::Positive | Support::AtLeast { .. } => out.push(by(0) * libm::exp(near(at(0))) + 1.0),
+            Support::AtMost { .. } => out.push(1.0 - by(0) * libm::exp(near(at(0)))),
+            Support::Ascending(one, n) => ascending::free_gradient(one, *n, at, by, out),
+            Support::CorrelationFactor(n) => triangle::correlation_gradient(*n, at, by, out),
+            Support::CovarianceFactor(n) => triangle::covariance_gradient(*n, at, by, out),
             Support::Interval { lo, hi } => {
                 let p = crate::num::expit(near(at(0)));
                 out.push(by(0) * (hi - lo) * p * (1.0 - p) + 1.0 - 2.0 * p);

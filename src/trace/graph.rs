@@ -80,6 +80,8 @@ pub(crate) struct Graph {
     pub vanished: u32,
     pub choices: Choices,
     pub draws: Draws,
+    /// While a program runs for the first time: improper choices may take a value to start from.
+    pub starting: bool,
     /// Values that choices take when they are first drawn.
     pub constraints: FxHashMap<u64, Constraint>,
     /// During a query: the sums before it, for probes.
@@ -123,6 +125,7 @@ impl Graph {
             vanished: 0,
             choices: Choices::default(),
             draws: Draws::default(),
+            starting: false,
             constraints: FxHashMap::default(),
             before: None,
             incremental: true,

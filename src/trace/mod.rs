@@ -79,7 +79,9 @@ impl Trace {
             g.nodes[*s as usize].refs = 1;
         }
         g.effects.extend(effects);
+        g.starting = true;
         g.settle(&trace.code)?;
+        g.starting = false;
         let weight = g.weight(&before.prior, &before.likelihood);
         g.commit(&trace.code);
         g.constraints.clear();

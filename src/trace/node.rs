@@ -39,6 +39,8 @@ pub(crate) const HELD: u8 = 1;
 pub(crate) const TARGET: u8 = 2;
 /// The node's state before it began to run was [`State::Stale`].
 pub(crate) const WAS_STALE: u8 = 4;
+/// The node is a choice with an improper distribution: nothing can draw it.
+pub(crate) const IMPROPER: u8 = 8;
 
 /// A node.
 #[derive(Clone, Debug, Default)]
@@ -61,7 +63,7 @@ pub(crate) struct Node {
     pub outside: u32,
     /// How far its value can be trusted.
     pub state: State,
-    /// [`HELD`], [`TARGET`].
+    /// [`HELD`], [`TARGET`], [`WAS_STALE`], [`IMPROPER`].
     pub flags: u8,
 }
 

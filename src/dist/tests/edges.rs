@@ -28,6 +28,19 @@ fn poles_and_ends() {
     assert_eq!(at("poisson", &[3.0], 1e308), NEVER);
     assert_eq!(make("flip", &[1.0]).log_density_bool(true), 0.0);
     assert_eq!(make("flip", &[1.0]).log_density_bool(false), NEVER);
+    assert_eq!(at("truncated_normal", &[0.0, 1.0, 1.0, 2.0], 1f64.next_down()), NEVER);
+    assert!(at("truncated_normal", &[0.0, 1.0, 1.0, 2.0], 2.0).is_finite());
+    assert_eq!(at("inv_gamma", &[1.0, 1.0], 0.0), NEVER);
+    assert_eq!(at("weibull", &[0.5, 1.0], 0.0), NEVER);
+    assert_eq!(at("laplace", &[1.0, 0.5], 1.0), 0.0);
+    assert_eq!(at("von_mises", &[0.0, 1.0], -std::f64::consts::PI), NEVER);
+    assert_eq!(at("von_mises", &[7.0, 2.0], 1.0), at("von_mises", &[7.0 - std::f64::consts::TAU, 2.0], 1.0));
+    assert_eq!(at("neg_binomial", &[2.0, 1.0], 0.0), 0.0);
+    assert_eq!(at("neg_binomial", &[2.0, 1.0], 1.0), NEVER);
+    assert_eq!(at("geometric", &[1.0], 0.0), 0.0);
+    assert_eq!(at("flat", &[], -1e300), 0.0);
+    assert_eq!(make("multinomial", &[0.0, 1.0, 1.0]).log_density(&vec![0.0, 0.0].into()), 0.0);
+    assert_eq!(make("lkj", &[1.0, 2.0]).log_density(&Datum::List(vec![vec![1.0].into()].into())), 0.0);
     let shares = |alpha: &[f64], x: [f64; 3]| make("dirichlet", alpha).log_density(&x.to_vec().into());
     assert_eq!(shares(&[0.5, 1.0, 2.0], [0.0, 0.5, 0.5]), f64::INFINITY);
     assert_eq!(shares(&[0.5, 1.0, 2.0], [0.0, 1.0, 0.0]), NEVER);
@@ -63,6 +76,32 @@ fn zoo() -> Vec<Dist> {
         ("categorical", &[1e-300, 1e300]),
         ("dirichlet", &[1e-300, 1e300, 1.0]),
         ("dirichlet", &[2.0]),
+        ("truncated_normal", &[0.0, 1.0, -INF, INF]),
+        ("truncated_normal", &[0.0, 1e-300, 1e-155, INF]),
+        ("truncated_normal", &[1e308, 1e308, -1e308, 1e308]),
+        ("truncated_normal", &[0.0, 1.0, -1e149, 1.0]),
+        ("truncated_normal", &[0.0, 1.0, 1e149, 2e149]),
+        ("truncated_normal", &[0.0, 1.0, -1e-300, 1e-300]),
+        ("truncated_normal", &[0.0, 1.0, 1.0, 1f64.next_up()]),
+        ("inv_gamma", &[1e-300, 1e300]),
+        ("inv_gamma", &[1e300, 1e-300]),
+        ("inv_gamma", &[100.0, 1e-300]),
+        ("cauchy", &[-1e308, 1e308]),
+        ("laplace", &[1e308, 1e-300]),
+        ("von_mises", &[1e308, 1e300]),
+        ("von_mises", &[3.0, 1e-300]),
+        ("von_mises", &[3.0, 1e-14]),
+        ("weibull", &[1e-300, 1e300]),
+        ("weibull", &[1e300, 1e-300]),
+        ("neg_binomial", &[1e-300, 1e-300]),
+        ("neg_binomial", &[1e300, 1e-300]),
+        ("neg_binomial", &[0.9, 0.5]),
+        ("neg_binomial", &[1e300, 1.0]),
+        ("geometric", &[1e-320]),
+        ("flat", &[]),
+        ("multinomial", &[9e15, 1e-300, 1e300, 1.0]),
+        ("lkj", &[3.0, 1e-300]),
+        ("lkj", &[3.0, 1e300]),
     ];
     let mut all: Vec<Dist> = cases.iter().map(|(f, p)| make(f, p)).collect();
     let parts = all[..3].to_vec();
@@ -70,6 +109,17 @@ fn zoo() -> Vec<Dist> {
     all.push(Dist::Iid(Arc::new(Iid::new(make("normal", &[0.0, 1.0]), 3).unwrap())));
     let identity = nalgebra::DMatrix::identity(3, 3);
     all.push(Dist::MvNormal(Arc::new(MvNormal::from_cov(&[0.0; 3], &identity).unwrap())));
+    let whitened = MvNormal::from_cov(&[0.0; 3], &identity).unwrap().to_whitened();
+    all.push(Dist::MvNormal(Arc::new(whitened)));
+    let scale = square(3, &[1e-100, 0.0, 0.0, 1e100, 1e100, 0.0, 0.0, 0.0, 1.0]);
+    for df in [2.0001, 3.0, 1e300] {
+        all.push(Dist::Wishart(Arc::new(Wishart::new(df, &scale).unwrap())));
+    }
+    for one in [make("cauchy", &[0.0, 1e300]), make("uniform", &[0.0, 1.0]), make("flat", &[])] {
+        all.push(Dist::Ordered(Arc::new(Ordered::new(one, 3).unwrap())));
+    }
+    let extremes = vec![make("beta", &[0.01, 0.01]), make("cauchy", &[0.0, 1e300]), make("gamma", &[1e-3, 1.0])];
+    all.push(Dist::Mixture(Arc::new(Mixture::new(&[1.0, 1e-300, 0.0], extremes).unwrap())));
     let gp =
         |centred| Gp::new(vec![0.0; 3], &Covariance::sq_exp(1.0, 1.0).unwrap(), &[0.0, 1.0, 1.0], centred).unwrap();
     all.push(Dist::Gp(Arc::new(gp(false))));
@@ -84,7 +134,18 @@ fn nothing_is_ever_nan() {
     for d in zoo() {
         for x in extremes.into_iter().chain(infinite) {
             let others = [vec![x; 3].into(), Datum::List(vec![Datum::Num(x), Datum::Num(0.5), Datum::Num(x)].into())];
-            for x in others.into_iter().chain([Datum::Num(x)]) {
+            let matrix = Datum::List(vec![vec![x; 3].into(); 3].into());
+            let triangle = Datum::List(
+                (0..3)
+                    .map(|i| {
+                        (0..3)
+                            .map(|j| if j < i { 0.0 } else { x * f64::from(u8::from(i == j)) })
+                            .collect::<Vec<_>>()
+                            .into()
+                    })
+                    .collect(),
+            );
+            for x in others.into_iter().chain([matrix, triangle]).chain([Datum::Num(x)]) {
                 let p = d.log_density(&x);
                 assert!(!p.is_nan(), "{d:?} at {x:?}");
                 assert!(!d.log_density_stored(&x).is_nan(), "{d:?} at {x:?}");
@@ -154,6 +215,15 @@ fn bad_parameters_are_errors_that_say_so() {
         ("poisson", 1),
         ("categorical", 2),
         ("dirichlet", 2),
+        ("inv_gamma", 2),
+        ("cauchy", 2),
+        ("laplace", 2),
+        ("von_mises", 2),
+        ("weibull", 2),
+        ("neg_binomial", 2),
+        ("geometric", 1),
+        ("multinomial", 3),
+        ("lkj", 2),
     ];
     for (family, n) in sizes {
         for bad in [f64::NAN, f64::INFINITY, f64::NEG_INFINITY] {
@@ -164,6 +234,23 @@ fn bad_parameters_are_errors_that_say_so() {
             }
         }
     }
+    let bad = [
+        [0.0, 1.0, 2.0, 1.0],
+        [0.0, 1.0, f64::NAN, 1.0],
+        [0.0, 1e-300, 1.0, 2.0],
+        [INF, 1.0, 0.0, 1.0],
+        [0.0, 0.0, 0.0, 1.0],
+    ];
+    for p in bad.iter().chain([&[0.0, 1.0, INF, INF], &[0.0, 1.0, -INF, -INF]]) {
+        assert!(try_make("truncated_normal", p).is_err(), "{p:?}");
+    }
+    assert_eq!(
+        message("truncated_normal", &[0.0, 1e-300, 1.0, 2.0]),
+        "truncated_normal: lo to hi must be within 1e150 sd of the mean, got 1 and 2"
+    );
+    assert_eq!(message("multinomial", &[3.0, 0.0]), "multinomial: weights must have a positive, finite sum, got 0");
+    assert_eq!(message("geometric", &[0.0]), "geometric: p must be above 0 and at most 1, got 0");
+    assert_eq!(message("lkj", &[0.0, 1.0]), "lkj: n must be between 1 and 1000, got 0");
     assert!(try_make("uniform", &[-1e308, 1e308]).is_err());
     assert!(try_make("dirichlet", &[]).is_err() && try_make("categorical", &[]).is_err());
 }

@@ -31,6 +31,20 @@ fn numbers() {
         ("binomial", &[20.0, 0.3], &[0.0, 6.0, 20.0]),
         ("poisson", &[4.0], &[0.0, 3.0, 12.0]),
         ("categorical", &[1.0, 2.0, 0.5], &[0.0, 1.0, 2.0]),
+        ("truncated_normal", &[0.5, 2.0, -1.0, 3.0], &[-0.5, 0.6, 2.5]),
+        ("truncated_normal", &[0.5, 2.0, 8.0, 10.0], &[8.5, 9.5]),
+        ("truncated_normal", &[0.5, 2.0, 0.4, 0.9], &[0.6]),
+        ("truncated_normal", &[0.0, 1.0, -9.0, -8.0], &[-8.5]),
+        ("inv_gamma", &[0.4, 2.0], &[0.05, 1.0, 40.0]),
+        ("inv_gamma", &[90.0, 30.0], &[0.2, 0.4]),
+        ("cauchy", &[1.0, 0.5], &[-30.0, 0.9, 2.0]),
+        ("laplace", &[1.0, 0.5], &[-30.0, 0.9, 2.0]),
+        ("von_mises", &[1.0, 0.5], &[-3.0, 0.9, 2.0]),
+        ("von_mises", &[-1.0, 40.0], &[-1.3, -0.7]),
+        ("weibull", &[0.6, 3.0], &[0.05, 1.0, 9.0]),
+        ("weibull", &[8.0, 3.0], &[2.0, 3.5]),
+        ("neg_binomial", &[2.5, 0.3], &[0.0, 4.0, 30.0]),
+        ("geometric", &[0.3], &[0.0, 4.0]),
     ];
     for (family, p, points) in cases {
         for x in *points {
@@ -55,6 +69,28 @@ fn numbers() {
             }
         }
     }
+}
+
+#[test]
+fn infinite_bounds_and_flat_densities() {
+    let half = make("truncated_normal", &[0.5, 2.0, 8.0, INF]);
+    let g = half.gradient(&Datum::Num(9.0)).unwrap();
+    let by_lo = difference(|lo| make("truncated_normal", &[0.5, 2.0, lo, INF]).log_density_num(9.0), 8.0);
+    close(g.params[2], by_lo, "by the lower bound");
+    assert_eq!(g.params[3], 0.0);
+    let flat = make("flat", &[]).gradient(&Datum::Num(9.0)).unwrap();
+    assert_eq!((flat.x, flat.params), (vec![0.0], vec![]));
+    let x: Datum = vec![2.0, 0.0, 5.0].into();
+    let at = |w: f64| make("multinomial", &[7.0, 1.0, 0.5, w]).log_density(&x);
+    let g = make("multinomial", &[7.0, 1.0, 0.5, 2.0]).gradient(&x).unwrap();
+    assert_eq!((g.x.len(), g.params.len(), g.params[0]), (0, 4, 0.0));
+    close(g.params[3], difference(at, 2.0), "multinomial by a weight");
+    let sorted = |sd: f64| Ordered::new(make("normal", &[1.0, sd]), 3).unwrap();
+    let x: Datum = vec![-2.0, 0.1, 5.0].into();
+    let g = sorted(1.5).gradient(&x).unwrap();
+    close(g.params[1], difference(|sd| sorted(sd).log_density(&x), 1.5), "ordered by sd");
+    let moved = |v: f64| sorted(1.5).log_density(&vec![-2.0, v, 5.0].into());
+    close(g.x[1], difference(moved, 0.1), "ordered by x");
 }
 
 #[test]

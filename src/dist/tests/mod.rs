@@ -4,6 +4,8 @@
 mod edges;
 mod gaussian;
 mod gradients;
+mod matrices;
+mod mixtures;
 mod normalisation;
 mod samplers;
 mod transforms;
@@ -16,6 +18,8 @@ use std::sync::Arc;
 fn stream(site: u64) -> Stream {
     StreamKey::new(20, 0, Purpose::VALUES).stream(0, site, 0)
 }
+
+const INF: f64 = f64::INFINITY;
 
 /// A square matrix by rows.
 fn square(n: usize, entries: &[f64]) -> nalgebra::DMatrix<f64> {
@@ -38,6 +42,17 @@ fn try_make(family: &str, p: &[f64]) -> Result<Dist, ParamError> {
         "half_normal" => Dist::HalfNormal(HalfNormal::new(p[0])?),
         "half_cauchy" => Dist::HalfCauchy(HalfCauchy::new(p[0], p[1])?),
         "student_t" => Dist::StudentT(StudentT::new(p[0], p[1], p[2])?),
+        "truncated_normal" => Dist::TruncatedNormal(Arc::new(TruncatedNormal::new(p[0], p[1], p[2], p[3])?)),
+        "inv_gamma" => Dist::InvGamma(InvGamma::new(p[0], p[1])?),
+        "cauchy" => Dist::Cauchy(Cauchy::new(p[0], p[1])?),
+        "laplace" => Dist::Laplace(Laplace::new(p[0], p[1])?),
+        "von_mises" => Dist::VonMises(VonMises::new(p[0], p[1])?),
+        "weibull" => Dist::Weibull(Weibull::new(p[0], p[1])?),
+        "neg_binomial" => Dist::NegBinomial(NegBinomial::new(p[0], p[1])?),
+        "geometric" => Dist::Geometric(Geometric::new(p[0])?),
+        "flat" => Dist::Flat(Flat),
+        "multinomial" => Dist::Multinomial(Arc::new(Multinomial::new(p[0], &p[1..])?)),
+        "lkj" => Dist::Lkj(Arc::new(Lkj::new(p[0], p[1])?)),
         "flip" => Dist::Flip(Flip::new(p[0])?),
         "uniform_discrete" => Dist::UniformDiscrete(UniformDiscrete::new(p[0], p[1])?),
         "binomial" => Dist::Binomial(Binomial::new(p[0], p[1])?),
@@ -46,4 +61,14 @@ fn try_make(family: &str, p: &[f64]) -> Result<Dist, ParamError> {
         "dirichlet" => Dist::Dirichlet(Arc::new(Dirichlet::new(p)?)),
         other => panic!("no family {other}"),
     })
+}
+
+/// All numbers in a value, in order.
+fn numbers(x: &Datum) -> Vec<f64> {
+    match x {
+        Datum::Num(x) => vec![*x],
+        Datum::Vec(xs) => xs.to_vec(),
+        Datum::List(xs) => xs.iter().flat_map(numbers).collect(),
+        Datum::Bool(_) => Vec::new(),
+    }
 }

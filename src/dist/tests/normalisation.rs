@@ -18,6 +18,17 @@ fn continuous_densities_integrate_to_one() {
         ("half_normal", &[0.1]),
         ("half_cauchy", &[2.0, 0.5]),
         ("student_t", &[4.0, 1.0, 2.0]),
+        ("truncated_normal", &[0.3, 2.0, -INF, INF]),
+        ("truncated_normal", &[0.0, 1.0, 30.0, INF]),
+        ("truncated_normal", &[0.0, 0.5, -INF, -4.0]),
+        ("truncated_normal", &[0.0, 1.0, 30.0, 30.01]),
+        ("truncated_normal", &[1.0, 1.0, 0.9, 3.5]),
+        ("truncated_normal", &[1.0, 1.0, -100.0, -3.0]),
+        ("inv_gamma", &[0.3, 2.0]),
+        ("inv_gamma", &[80.0, 70.0]),
+        ("laplace", &[1.0, 3.0]),
+        ("weibull", &[0.3, 2.0]),
+        ("weibull", &[9.0, 2.0]),
     ];
     for (family, p) in cases {
         let d = make(family, p);
@@ -47,6 +58,12 @@ fn probabilities_sum_to_one() {
         ("poisson", &[0.0], 5),
         ("poisson", &[0.3], 40),
         ("poisson", &[500.0], 2000),
+        ("neg_binomial", &[0.4, 0.3], 200),
+        ("neg_binomial", &[1e-12, 0.3], 200),
+        ("neg_binomial", &[50.0, 0.2], 1000),
+        ("neg_binomial", &[2.0, 1.0], 3),
+        ("geometric", &[0.2], 200),
+        ("geometric", &[1.0], 3),
         ("categorical", &[3.0, 0.0, 1e-3, 5.0], 3),
     ];
     for (family, p, last) in cases {
@@ -70,4 +87,69 @@ fn shares_integrate_to_one() {
         }
     }
     assert!((total - 1.0).abs() < 1e-8, "{total}");
+}
+
+#[test]
+fn angles_integrate_to_one() {
+    for p in [[0.3, 0.0], [1.0, 0.2], [-3.0, 5.0], [3.1, 200.0]] {
+        let d = make("von_mises", &p);
+        let n = 2000;
+        let h = std::f64::consts::TAU / f64::from(n);
+        // Equal steps around the circle: exact for periodic functions as smooth as these.
+        let total: f64 =
+            (1..=n).map(|i| d.log_density_num(-std::f64::consts::PI + h * f64::from(i)).exp()).sum::<f64>() * h;
+        assert!((total - 1.0).abs() < 1e-9, "{p:?}: {total}");
+    }
+    // The Cauchy distribution's tails are too heavy for the rule; over the angle it is uniform.
+    let d = make("cauchy", &[1.0, 0.5]);
+    for t in [-1.5f64, -0.2, 0.0, 1.4] {
+        let x = 1.0 + 0.5 * t.tan();
+        assert!((d.log_density_num(x).exp() * 0.5 / (t.cos() * t.cos()) * std::f64::consts::PI - 1.0).abs() < 1e-12);
+    }
+}
+
+#[test]
+fn counts_of_kinds_sum_to_one() {
+    for (n, weights) in [(0, [1.0, 1.0, 1.0]), (7, [0.2, 3.0, 1.0]), (40, [1.0, 0.0, 2.0]), (90, [1.0, 5.0, 2.0])] {
+        let d = Multinomial::new(f64::from(n), &weights).unwrap();
+        let mut total = 0.0;
+        for i in 0..=n {
+            for j in 0..=n - i {
+                let x: Vec<f64> = [i, j, n - i - j].map(f64::from).to_vec();
+                total += d.log_density(&x.into()).exp();
+            }
+        }
+        assert!((total - 1.0).abs() < 1e-12, "{n} {weights:?}: {total}");
+    }
+}
+
+/// The integral over unconstrained space of two dimensions.
+fn plane(d: &dyn Distribution, reach: f64, h: f64) -> f64 {
+    let (s, n) = (d.support(), (reach / h) as i32);
+    let mut total = 0.0;
+    for i in -n..=n {
+        for j in -n..=n {
+            let (x, jacobian) = s.from_free(&[h * f64::from(i), h * f64::from(j)]);
+            total += (d.log_density(&x) + jacobian).exp() * h * h;
+        }
+    }
+    total
+}
+
+#[test]
+fn vectors_integrate_to_one() {
+    let check = |d: &dyn Distribution, reach, h| {
+        let total = plane(d, reach, h);
+        assert!((total - 1.0).abs() < 1e-6, "{d:?}: {total}");
+    };
+    check(&Ordered::new(make("normal", &[1.0, 1.5]), 2).unwrap(), 40.0, 0.05);
+    check(&Ordered::new(make("uniform", &[0.0, 3.0]), 2).unwrap(), 40.0, 0.05);
+    let one = make("normal", &[0.0, 1.0]);
+    let pair = |m: f64| Dist::Product(Arc::new(Product::new(vec![make("normal", &[m, 0.7]), one.clone()]).unwrap()));
+    check(&Mixture::new(&[1.0, 3.0], vec![pair(-2.0), pair(1.0)]).unwrap(), 12.0, 0.05);
+    // Numbers on intervals that do not agree.
+    let mixed = Mixture::new(&[1.0, 1.0], vec![make("gamma", &[2.0, 1.0]), make("normal", &[0.0, 2.0])]).unwrap();
+    assert_eq!(mixed.support(), Support::Real);
+    let total: f64 = (-40_000..40_000).map(|i| mixed.log_density(&Datum::Num(f64::from(i) * 1e-3)).exp()).sum();
+    assert!((total * 1e-3 - 1.0).abs() < 1e-6, "{total}");
 }

@@ -2,8 +2,9 @@
 //! reference-checked log densities (chi-square).
 
 use super::*;
-use crate::num::normal_cdf;
+use crate::num::{log_normal_cdf, normal_cdf};
 use statrs::distribution::{self as s, ContinuousCDF};
+use std::f64::consts::{PI, TAU};
 
 const DRAWS: usize = 20_000;
 
@@ -34,6 +35,10 @@ fn continuous_draws_follow_their_distribution_functions() {
     let beta = |a, b| -> Cdf { Box::new(move |x| s::Beta::new(a, b).unwrap().cdf(x)) };
     let gamma = |a, b| -> Cdf { Box::new(move |x| s::Gamma::new(a, b).unwrap().cdf(x)) };
     let student = |v, m, k| -> Cdf { Box::new(move |x| s::StudentsT::new(m, k, v).unwrap().cdf(x)) };
+    let between = |lo, hi| -> Cdf {
+        let (from, all) = (normal_cdf(lo), normal_cdf(hi) - normal_cdf(lo));
+        Box::new(move |x| (normal_cdf(x) - from) / all)
+    };
     let cases: Vec<(&str, Vec<f64>, Cdf)> = vec![
         ("normal", vec![-2.0, 0.3], Box::new(|x| normal_cdf((x + 2.0) / 0.3))),
         ("lognormal", vec![1.0, 2.0], Box::new(|x: f64| normal_cdf((x.ln() - 1.0) / 2.0))),
@@ -54,6 +59,38 @@ fn continuous_draws_follow_their_distribution_functions() {
         ("student_t", vec![4.0, 1.0, 0.5], student(4.0, 1.0, 0.5)),
         ("student_t", vec![0.2, 0.0, 1.0], student(0.2, 0.0, 1.0)),
         ("student_t", vec![500.0, 0.0, 1.0], student(500.0, 0.0, 1.0)),
+        ("truncated_normal", vec![1.0, 2.0, -INF, INF], Box::new(|x| normal_cdf((x - 1.0) / 2.0))),
+        ("truncated_normal", vec![0.0, 1.0, -1.0, 0.5], between(-1.0, 0.5)),
+        ("truncated_normal", vec![0.0, 1.0, -3.0, 0.5], between(-3.0, 0.5)),
+        ("truncated_normal", vec![0.0, 1.0, 0.5, 0.6], between(0.5, 0.6)),
+        ("truncated_normal", vec![0.0, 1.0, 1.0, 4.0], between(1.0, 4.0)),
+        ("truncated_normal", vec![0.0, 1.0, -6.0, -4.0], between(-6.0, -4.0)),
+        ("truncated_normal", vec![0.0, 1.0, -INF, 2.0], between(-INF, 2.0)),
+        // Thirty sd out.
+        (
+            "truncated_normal",
+            vec![0.0, 1.0, 30.0, INF],
+            Box::new(|x: f64| 1.0 - (log_normal_cdf(-x) - log_normal_cdf(-30.0)).exp()),
+        ),
+        (
+            "truncated_normal",
+            vec![5.0, 0.1, -INF, 2.0],
+            Box::new(|x: f64| (log_normal_cdf((x - 5.0) / 0.1) - log_normal_cdf(-30.0)).exp()),
+        ),
+        ("inv_gamma", vec![3.5, 2.0], Box::new(|x: f64| 1.0 - s::Gamma::new(3.5, 2.0).unwrap().cdf(1.0 / x))),
+        ("inv_gamma", vec![0.2, 2.0], Box::new(|x: f64| 1.0 - s::Gamma::new(0.2, 2.0).unwrap().cdf(1.0 / x))),
+        ("cauchy", vec![1.0, 3.0], Box::new(|x: f64| 0.5 + ((x - 1.0) / 3.0).atan() * std::f64::consts::FRAC_1_PI)),
+        (
+            "laplace",
+            vec![0.0, 2.0],
+            Box::new(|x: f64| if x < 0.0 { 0.5 * (x / 2.0).exp() } else { 1.0 - 0.5 * (-x / 2.0).exp() }),
+        ),
+        ("weibull", vec![0.4, 3.0], Box::new(|x: f64| -(-(x / 3.0).powf(0.4)).exp_m1())),
+        ("weibull", vec![7.0, 3.0], Box::new(|x: f64| -(-(x / 3.0).powf(7.0)).exp_m1())),
+        ("von_mises", vec![0.5, 0.0], Box::new(|x: f64| 0.5 + x / TAU)),
+        ("von_mises", vec![0.5, 1e8], Box::new(|x: f64| normal_cdf((x - 0.5) * 1e4))),
+        // What a chain with the improper prior starts from.
+        ("flat", vec![], Box::new(|x: f64| (x + 2.0) / 4.0)),
     ];
     for (i, (family, p, cdf)) in cases.iter().enumerate() {
         let d = distance(draws(&make(family, p), i as u64), cdf);
@@ -102,6 +139,11 @@ fn counts_follow_their_probabilities() {
         ("poisson", &[80.0], 300),
         ("poisson", &[4000.0], 5000),
         ("categorical", &[1.0, 0.0, 3.0, 0.5], 3),
+        ("neg_binomial", &[2.5, 0.3], 60),
+        ("neg_binomial", &[0.1, 0.01], 2000),
+        ("neg_binomial", &[400.0, 0.5], 800),
+        ("geometric", &[0.2], 80),
+        ("geometric", &[0.001], 20_000),
     ];
     for (i, (family, p, last)) in cases.iter().enumerate() {
         let d = make(family, p);
@@ -130,6 +172,16 @@ fn draws_have_the_stated_moments() {
         ("binomial", &[1e12, 0.25]),
         ("poisson", &[1e9]),
         ("categorical", &[1.0, 2.0, 3.0]),
+        ("truncated_normal", &[1.0, 2.0, 0.0, 3.0]),
+        ("truncated_normal", &[1.0, 2.0, -INF, 0.0]),
+        ("truncated_normal", &[0.0, 1.0, 1e6, INF]),
+        ("truncated_normal", &[0.0, 1.0, 5.0, 5.01]),
+        ("inv_gamma", &[9.0, 4.0]),
+        ("laplace", &[1.0, 2.0]),
+        ("weibull", &[2.0, 3.0]),
+        ("weibull", &[5e4, 3.0]),
+        ("neg_binomial", &[7.5, 0.4]),
+        ("geometric", &[0.1]),
     ];
     for (i, (family, p)) in cases.iter().enumerate() {
         let d = make(family, p);
@@ -142,6 +194,10 @@ fn draws_have_the_stated_moments() {
     }
     assert!(make("student_t", &[1.0, 0.0, 1.0]).mean().is_none());
     assert!(make("half_cauchy", &[0.0, 1.0]).mean().is_none());
+    assert!(make("cauchy", &[0.0, 1.0]).mean().is_none());
+    assert!(make("inv_gamma", &[1.0, 1.0]).mean().is_none() && make("inv_gamma", &[2.0, 1.0]).sd().is_none());
+    let ratio = make("weibull", &[1e8, 1.0]).sd().unwrap() / (PI / 6f64.sqrt() * 1e-8);
+    assert!((ratio - 1.0).abs() < 1e-7, "{ratio}");
 }
 
 #[test]
@@ -182,5 +238,56 @@ fn shares_have_beta_marginals() {
     for _ in 0..1000 {
         let x = tiny.sample(&mut rng);
         assert!(tiny.support().contains(&x) && tiny.log_density(&x).is_finite(), "{x:?}");
+    }
+}
+
+#[test]
+fn angles_fill_cells_of_equal_probability() {
+    for (i, p) in [[1.0, 1e-9], [0.5, 0.7], [-3.0, 3.0], [3.1, 50.0], [0.0, 1e5]].into_iter().enumerate() {
+        let d = make("von_mises", &p);
+        let xs = draws(&d, 420 + i as u64);
+        // The distribution function by steps around the mean, from its opposite on.
+        let (steps, reach) = (20_000, PI.min(12.0 / p[1].sqrt()));
+        let h = 2.0 * reach / f64::from(steps);
+        let at = |k: i32| make("von_mises", &[0.0, p[1]]).log_density_num(-reach + h * (f64::from(k) + 0.5)).exp() * h;
+        let mut sums = vec![0.0];
+        (0..steps).for_each(|k| sums.push(sums[k as usize] + at(k)));
+        let turned: Vec<f64> = xs.iter().map(|x| ((x - p[0] + PI).rem_euclid(TAU)) - PI).collect();
+        let cdf = |x: f64| sums[(((x + reach) / h).round().max(0.0) as usize).min(sums.len() - 1)];
+        let mut cells = [0.0; 20];
+        turned.iter().for_each(|x| cells[((cdf(*x) * 20.0) as usize).min(19)] += 1.0);
+        let expected = DRAWS as f64 / 20.0;
+        let statistic: f64 = cells.iter().map(|c| (c - expected) * (c - expected) / expected).sum();
+        // 19 degrees of freedom: 50 is exceeded with probability 1.3e-4.
+        assert!(statistic < 50.0, "{p:?}: {statistic}");
+    }
+}
+
+#[test]
+fn counts_of_kinds_have_binomial_marginals() {
+    let d = make("multinomial", &[12.0, 2.0, 0.0, 1.0, 3.0]);
+    let mut rng = stream(430);
+    let xs: Vec<Datum> = (0..DRAWS).map(|_| d.sample(&mut rng)).collect();
+    assert!(xs.iter().all(|x| d.support().contains(x) && d.log_density(x).is_finite()));
+    for (i, w) in [2.0, 0.0, 1.0, 3.0].into_iter().enumerate() {
+        let counts: Vec<f64> = xs.iter().map(|x| numbers(x)[i]).collect();
+        let (statistic, freedom) = chi_square(&counts, &make("binomial", &[12.0, w / 6.0]), 0..=12);
+        assert!(statistic < 15.0 + 3.0 * freedom as f64, "kind {i}: {statistic} with {freedom}");
+    }
+    // Two counts together: n p q less.
+    let (mean, n) = ([4.0, 6.0], DRAWS as f64);
+    let covariance: f64 = xs.iter().map(|x| (numbers(x)[0] - mean[0]) * (numbers(x)[3] - mean[1])).sum::<f64>() / n;
+    assert!((covariance + 12.0 / 3.0 / 2.0).abs() < 0.1, "{covariance}");
+}
+
+#[test]
+fn sorted_draws_are_order_statistics() {
+    let d = Ordered::new(make("uniform", &[0.0, 1.0]), 3).unwrap();
+    let mut rng = stream(431);
+    let xs: Vec<Vec<f64>> = (0..DRAWS).map(|_| numbers(&d.sample(&mut rng))).collect();
+    for k in 0..3 {
+        let marginal = s::Beta::new((k + 1) as f64, (3 - k) as f64).unwrap();
+        let d = distance(xs.iter().map(|x| x[k]).collect(), &|x| marginal.cdf(x));
+        assert!(d < 2.2, "number {k}: {d}");
     }
 }

@@ -2,15 +2,7 @@
 
 use super::*;
 use nalgebra::DMatrix;
-
-fn numbers(x: &Datum) -> Vec<f64> {
-    match x {
-        Datum::Num(x) => vec![*x],
-        Datum::Vec(xs) => xs.to_vec(),
-        Datum::List(xs) => xs.iter().flat_map(numbers).collect(),
-        Datum::Bool(_) => Vec::new(),
-    }
-}
+use std::f64::consts::TAU;
 
 fn supports() -> Vec<Support> {
     vec![
@@ -18,6 +10,18 @@ fn supports() -> Vec<Support> {
         Support::Positive,
         Support::AtLeast { lo: -3.0 },
         Support::Interval { lo: -2.0, hi: 5.0 },
+        Support::AtMost { hi: 4.0 },
+        Support::Circle,
+        Support::Ascending(Box::new(Support::Real), 3),
+        Support::Ascending(Box::new(Support::Interval { lo: -1.0, hi: 3.0 }), 3),
+        Support::Ascending(Box::new(Support::Positive), 0),
+        Support::CorrelationFactor(1),
+        Support::CorrelationFactor(2),
+        Support::CorrelationFactor(4),
+        Support::CovarianceFactor(1),
+        Support::CovarianceFactor(3),
+        Support::Counts { total: 5, kinds: 3 },
+        Support::Product(Box::new(Support::CovarianceFactor(2)), 2),
         Support::Vector(3),
         Support::Simplex(1),
         Support::Simplex(2),
@@ -35,6 +39,13 @@ fn points(n: usize) -> Vec<Vec<f64>> {
     (0..20).map(|_| (0..n).map(|_| 2.0 * rng.standard_normal()).collect()).collect()
 }
 
+/// Whether two coordinates are of the same point; those of angles go around.
+fn same(s: &Support, a: f64, b: f64) -> bool {
+    let d = a - b;
+    let d = if *s == Support::Circle { d - TAU * (d / TAU).round() } else { d };
+    d.abs() < 1e-9
+}
+
 #[test]
 fn there_and_back() {
     for s in supports() {
@@ -44,7 +55,7 @@ fn there_and_back() {
             let mut back = vec![7.0];
             s.to_free(&x, &mut back);
             assert_eq!(back.len(), 1 + y.len());
-            assert!(y.iter().zip(&back[1..]).all(|(a, b)| (a - b).abs() < 1e-9), "{s:?}: {y:?} against {back:?}");
+            assert!(y.iter().zip(&back[1..]).all(|(a, b)| same(&s, *a, *b)), "{s:?}: {y:?} against {back:?}");
         }
     }
 }
@@ -53,6 +64,9 @@ fn there_and_back() {
 fn independent(s: &Support, x: &Datum) -> Vec<f64> {
     match (s, x) {
         (Support::Simplex(n), x) => numbers(x)[..n - 1].to_vec(),
+        (Support::Counts { .. }, _) => Vec::new(),
+        (Support::CorrelationFactor(n), x) => (0..*n).flat_map(|i| numbers(x)[i * n..i * n + i].to_vec()).collect(),
+        (Support::CovarianceFactor(n), x) => (0..*n).flat_map(|i| numbers(x)[i * n..=i * n + i].to_vec()).collect(),
         (Support::Product(one, n), x) => (0..*n).flat_map(|i| independent(one, &x.element(i).unwrap())).collect(),
         (Support::Each(all), x) => {
             all.iter().enumerate().flat_map(|(i, s)| independent(s, &x.element(i).unwrap())).collect()

@@ -25,7 +25,7 @@ macro_rules! scalar {
             variadic: false,
             returns: Type::Dist,
             doc: family($name).doc,
-            kind: Kind::Distribution(|a| elementwise(a, |[$($p),+]| $made)),
+            kind: Kind::Distribution(|a| elementwise(a, &[], |[$($p),+]| $made)),
         }
     };
 }
@@ -54,6 +54,35 @@ pub(super) const TABLE: &[Builtin] = &[
     scalar!("half_normal", [sd], dist::HalfNormal::new(sd).map(Dist::HalfNormal)),
     scalar!("half_cauchy", [location, scale], dist::HalfCauchy::new(location, scale).map(Dist::HalfCauchy)),
     scalar!("student_t", [df, location, scale], dist::StudentT::new(df, location, scale).map(Dist::StudentT)),
+    other(
+        "truncated_normal",
+        &[
+            arg("mean", Type::Nums, "The mean before truncation."),
+            arg("sd", Type::Nums, "The standard deviation before truncation, positive."),
+            opt("lo", Type::Nums, "-inf", "The lower bound."),
+            opt("hi", Type::Nums, "inf", "The upper bound, above `lo`."),
+        ],
+        |a| {
+            elementwise(a, &[0.0, 1.0, f64::NEG_INFINITY, f64::INFINITY], |[mean, sd, lo, hi]| {
+                dist::TruncatedNormal::new(mean, sd, lo, hi).map(|d| Dist::TruncatedNormal(Arc::new(d)))
+            })
+        },
+    ),
+    scalar!("inv_gamma", [shape, scale], dist::InvGamma::new(shape, scale).map(Dist::InvGamma)),
+    scalar!("cauchy", [location, scale], dist::Cauchy::new(location, scale).map(Dist::Cauchy)),
+    scalar!("laplace", [location, scale], dist::Laplace::new(location, scale).map(Dist::Laplace)),
+    other(
+        "von_mises",
+        &[
+            arg("mean", Type::Nums, "The mean direction: any finite number.").unit("radians"),
+            arg("concentration", Type::Nums, "How narrow it is, not negative; 0 is uniform."),
+        ],
+        |a| elementwise(a, &[], |[mean, k]| dist::VonMises::new(mean, k).map(Dist::VonMises)),
+    ),
+    scalar!("weibull", [shape, scale], dist::Weibull::new(shape, scale).map(Dist::Weibull)),
+    scalar!("neg_binomial", [r, p], dist::NegBinomial::new(r, p).map(Dist::NegBinomial)),
+    scalar!("geometric", [p], dist::Geometric::new(p).map(Dist::Geometric)),
+    other("flat", &[], |_| Ok(Dist::Flat(dist::Flat))),
     scalar!("flip", [p], dist::Flip::new(p).map(Dist::Flip)),
     scalar!("uniform_discrete", [lo, hi], dist::UniformDiscrete::new(lo, hi).map(Dist::UniformDiscrete)),
     scalar!("binomial", [n, p], dist::Binomial::new(n, p).map(Dist::Binomial)),
@@ -67,11 +96,49 @@ pub(super) const TABLE: &[Builtin] = &[
         dist::Dirichlet::new(&a.array(0)?).map(|d| Dist::Dirichlet(Arc::new(d))).map_err(fault)
     }),
     other(
+        "multinomial",
+        &[
+            arg("n", Type::Int, "How many draws."),
+            arg("weights", Type::Array, "One weight for each kind; they need not sum to 1."),
+        ],
+        |a| dist::Multinomial::new(a.num(0)?, &a.array(1)?).map(|d| Dist::Multinomial(Arc::new(d))).map_err(fault),
+    ),
+    other(
+        "lkj",
+        &[
+            arg("n", Type::Int, "How many rows, from 1 to 1000."),
+            arg(
+                "eta",
+                Type::Num,
+                "The shape, positive: 1 is uniform over correlation matrices, more is closer to independence.",
+            ),
+        ],
+        |a| dist::Lkj::new(a.num(0)?, a.num(1)?).map(|d| Dist::Lkj(Arc::new(d))).map_err(fault),
+    ),
+    other(
+        "wishart",
+        &[
+            arg("df", Type::Num, "The degrees of freedom, above the number of rows less 1."),
+            arg(
+                "scale_chol",
+                Type::Array,
+                "The lower triangular Cholesky factor of the scale matrix, an array of rows.",
+            ),
+        ],
+        wishart,
+    ),
+    other(
         "mv_normal",
         &[
             arg("mean", Type::Array, "The mean vector."),
             opt("cov", Type::Array, "none", "The covariance matrix, an array of rows; or `chol`, one of them."),
             opt("chol", Type::Array, "none", "The lower triangular Cholesky factor of the covariance."),
+            opt(
+                "whitened",
+                Type::Bool,
+                "false",
+                "Stores the white noise z of mean + chol z, so that the value follows when these move.",
+            ),
         ],
         mv_normal,
     ),
@@ -89,6 +156,22 @@ pub(super) const TABLE: &[Builtin] = &[
         let Value::Dist(d) = a.get(0) else { return Err(a.wrong(0, "a distribution")) };
         dist::Iid::new(Dist::clone(d), a.count(1)?).map(|d| Dist::Iid(Arc::new(d))).map_err(fault)
     }),
+    other(
+        "ordered",
+        &[arg("d", Type::Dist, "A distribution of continuous numbers."), arg("n", Type::Int, "How many.")],
+        |a| {
+            let Value::Dist(d) = a.get(0) else { return Err(a.wrong(0, "a distribution")) };
+            dist::Ordered::new(Dist::clone(d), a.count(1)?).map(|d| Dist::Ordered(Arc::new(d))).map_err(fault)
+        },
+    ),
+    other(
+        "mixture",
+        &[
+            arg("weights", Type::Array, "One weight for each component; they need not sum to 1."),
+            arg("components", Type::Array, "Distributions with the same kind of values."),
+        ],
+        mixture,
+    ),
 ];
 
 /// What the reference says of a family besides its arguments.
@@ -101,19 +184,28 @@ fn fault(e: ParamError) -> Fault {
     Fault::domain(e.to_string())
 }
 
-/// A distribution of a number, or a product of such when a parameter is an array.
-fn elementwise<const N: usize>(a: &Args, make: fn([f64; N]) -> Result<Dist, ParamError>) -> Result<Dist, Fault> {
+/// A distribution of a number, or a product of such when a parameter is an array. Parameters left out have the defaults.
+fn elementwise<const N: usize>(
+    a: &Args,
+    defaults: &[f64],
+    make: fn([f64; N]) -> Result<Dist, ParamError>,
+) -> Result<Dist, Fault> {
     let mut parameters = [0.0; N];
     for (i, p) in parameters.iter_mut().enumerate() {
-        match a.get(i) {
-            Value::Num(x) => *p = *x,
-            _ => return product(a, make),
+        match (a.get(i), defaults.get(i)) {
+            (Value::Num(x), _) => *p = *x,
+            (Value::Unit, Some(default)) => *p = *default,
+            _ => return product(a, defaults, make),
         }
     }
     make(parameters).map_err(fault)
 }
 
-fn product<const N: usize>(a: &Args, make: fn([f64; N]) -> Result<Dist, ParamError>) -> Result<Dist, Fault> {
+fn product<const N: usize>(
+    a: &Args,
+    defaults: &[f64],
+    make: fn([f64; N]) -> Result<Dist, ParamError>,
+) -> Result<Dist, Fault> {
     let mut parameters = [0.0; N];
     let mut columns: [Option<Arc<[f64]>>; N] = [const { None }; N];
     // The first array, and its length.
@@ -121,6 +213,7 @@ fn product<const N: usize>(a: &Args, make: fn([f64; N]) -> Result<Dist, ParamErr
     for i in 0..N {
         match a.get(i) {
             Value::Num(x) => parameters[i] = *x,
+            Value::Unit if i < defaults.len() => parameters[i] = defaults[i],
             v if array_len(v).is_some() => {
                 let xs = a.array(i)?;
                 let (k, n) = *first.get_or_insert((i, xs.len()));
@@ -151,7 +244,25 @@ fn mv_normal(a: &Args) -> Result<Dist, Fault> {
         (false, true) => dist::MvNormal::from_chol(&mean, &square(a, 2, mean.len())?),
         _ => return Err(Fault::type_error("mv_normal: give either `cov` or `chol`")),
     };
-    made.map(|d| Dist::MvNormal(Arc::new(d))).map_err(fault)
+    let whitened = a.bool_or(3, false)?;
+    let stored = |d: dist::MvNormal| if whitened { d.to_whitened() } else { d };
+    made.map(|d| Dist::MvNormal(Arc::new(stored(d)))).map_err(fault)
+}
+
+fn wishart(a: &Args) -> Result<Dist, Fault> {
+    let m = Matrix::read(a, 1)?;
+    let scale = nalgebra::DMatrix::from_fn(m.rows.len(), m.width, |i, j| m.rows[i][j]);
+    dist::Wishart::new(a.num(0)?, &scale).map(|d| Dist::Wishart(Arc::new(d))).map_err(fault)
+}
+
+fn mixture(a: &Args) -> Result<Dist, Fault> {
+    let components = a.elements(1)?;
+    let component = |v: &Value| match v {
+        Value::Dist(d) => Ok(Dist::clone(d)),
+        other => Err(a.element_wrong(1, "an array of distributions", other)),
+    };
+    let components = components.iter().map(component).collect::<Result<Vec<_>, _>>()?;
+    dist::Mixture::new(&a.array(0)?, components).map(|d| Dist::Mixture(Arc::new(d))).map_err(fault)
 }
 
 /// A square matrix as large as the mean.

@@ -26,8 +26,8 @@ impl Lowerer<'_> {
         match d {
             DistSpec::Family { builtin, args } => match self.code.builtins.get(*builtin).name {
                 "flip" => Type::Any,
-                "dirichlet" | "mv_normal" | "gp" => Type::Array,
-                "iid" => Type::Any,
+                "dirichlet" | "mv_normal" | "gp" | "multinomial" | "lkj" | "wishart" | "ordered" => Type::Array,
+                "iid" | "mixture" => Type::Any,
                 _ if args.iter().all(|a| self.is_number(*a)) => Type::Num,
                 // A parameter that is an array makes the choice one.
                 _ => Type::Nums,

@@ -119,6 +119,7 @@ impl Graph {
         own: Option<u64>,
     ) -> Result<Value, Failure> {
         self.appeared += 1;
+        self.set_improper(n, dist);
         if let Some(count) = dist.elements() {
             let mut stored = Vec::with_capacity(count);
             let mut scores = Vec::with_capacity(count);
@@ -130,7 +131,7 @@ impl Graph {
                 let given = given.or_else(|| self.constraints.get(&at).and_then(|c| c.whole(&one)));
                 let x = match &given {
                     Some(x) => x.clone(),
-                    None => one.sample_stored(&mut self.draws.stream(at)),
+                    None => self.drawn_now(code, n, &one, at)?,
                 };
                 let score = one.log_density_stored(&x);
                 self.add_prior(score, given.is_none());
@@ -145,7 +146,7 @@ impl Graph {
         let given = self.constraints.get(&hash).and_then(|c| c.whole(dist));
         let stored = match &given {
             Some(x) => x.clone(),
-            None => dist.sample_stored(&mut self.draws.stream(hash)),
+            None => self.drawn_now(code, n, dist, hash)?,
         };
         let score = dist.log_density_stored(&stored);
         self.add_prior(score, given.is_none());
@@ -166,6 +167,25 @@ impl Graph {
         Ok(value)
     }
 
+    /// A draw from the prior.
+    fn drawn_now(&self, code: &Code, n: NodeId, dist: &Dist, hash: u64) -> Result<Datum, Failure> {
+        if dist.is_improper() && !self.starting {
+            return Err(self.improper(code, n, dist));
+        }
+        Ok(dist.sample_stored(&mut self.draws.stream(hash)))
+    }
+
+    fn set_improper(&mut self, n: NodeId, dist: &Dist) {
+        let flags = &mut self.nodes[n as usize].flags;
+        *flags = if dist.is_improper() { *flags | IMPROPER } else { *flags & !IMPROPER };
+    }
+
+    fn improper(&self, code: &Code, n: NodeId, dist: &Dist) -> Failure {
+        let message = format!("`{}` is improper: it cannot be drawn from", dist.name());
+        let hint = "use `drift` on it, condition on something that depends on it, or give it a proper prior";
+        self.fail(code, n, FaultKind::Domain, message, Some(hint.into()))
+    }
+
     fn add_prior(&mut self, score: f64, drawn: bool) {
         self.prior.add(score);
         if drawn {
@@ -182,7 +202,8 @@ impl Graph {
             if dist.elements() != Some(c.elements as usize) {
                 return Ok(false);
             }
-            self.update_elements(code, n, dist);
+            self.set_improper(n, dist);
+            self.update_elements(code, n, dist)?;
             return Ok(true);
         }
         if dist.elements().is_some() {
@@ -196,6 +217,7 @@ impl Graph {
         if whitened != self.is_whitened(n) || !dist.stored_support().fits(&old) {
             return Ok(false);
         }
+        self.set_improper(n, dist);
         let old_score = self.nodes[n as usize].score;
         let mut change = None;
         if self.nodes[n as usize].flags & TARGET != 0 {
@@ -206,7 +228,7 @@ impl Graph {
             Some(Change::Set(d)) => (Some(d), false),
             Some(Change::Resample) => {
                 let hash = self.choice_hash(code, n);
-                (Some(dist.sample_stored(&mut self.draws.stream(hash))), true)
+                (Some(self.drawn_now(code, n, dist, hash)?), true)
             }
             Some(Change::Free(y)) => {
                 let support = dist.stored_support();
@@ -255,9 +277,9 @@ impl Graph {
     }
 
     /// The same for a choice of many elements.
-    fn update_elements(&mut self, code: &Code, n: NodeId, dist: &Dist) {
+    fn update_elements(&mut self, code: &Code, n: NodeId, dist: &Dist) -> Result<(), Failure> {
         let hash = self.choice_hash(code, n);
-        let Some(Side::Choice(side)) = self.nodes[n as usize].side.as_deref() else { return };
+        let Some(Side::Choice(side)) = self.nodes[n as usize].side.as_deref() else { return Ok(()) };
         let side = side.clone();
         let count = side.elements as usize;
         let old = self.nodes[n as usize].value.clone();
@@ -280,7 +302,7 @@ impl Graph {
                         self.jacobian += jacobian;
                         Some(x)
                     }
-                    Change::Resample => Some(one.sample_stored(&mut self.draws.stream(element_hash(hash, i)))),
+                    Change::Resample => Some(self.drawn_now(code, n, &one, element_hash(hash, i))?),
                     Change::White(z) if *element == NONE => z.get(i).and_then(|z| one.colour(&[*z])),
                     Change::White(z) => one.colour(z),
                 };
@@ -311,6 +333,7 @@ impl Graph {
                 node.changed = epoch;
             }
         }
+        Ok(())
     }
 
     /// The stored form of a choice.
@@ -328,6 +351,10 @@ impl Graph {
     /// Takes a choice that nothing asks for out of the score and the register.
     pub(crate) fn retire_choice(&mut self, code: &Code, n: NodeId) {
         self.vanished += 1;
+        if self.nodes[n as usize].flags & IMPROPER != 0 {
+            // Nothing draws it again: with no way back, the update weighs nothing.
+            self.drawn.add(f64::INFINITY);
+        }
         let hash = self.choice_hash(code, n);
         if let Some(stored) = self.stored(n) {
             self.removed.push((n, hash, stored));

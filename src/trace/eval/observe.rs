@@ -188,6 +188,10 @@ fn score_value(dist: &Dist, observed: &Value) -> Result<Score, Fault> {
         Value::Num(x) => Ok(Score::One(dist.log_density(&Datum::Num(*x)))),
         Value::Bool(b) => Ok(Score::One(dist.log_density(&Datum::Bool(*b)))),
         Value::Array(xs) if dist.is_scalar() => sum_scores(xs.len(), |i| Ok(dist.log_density(&Datum::Num(xs[i])))),
+        Value::List(_) if observed.to_datum().is_some_and(|x| dist.support().fits(&x)) => {
+            let x = observed.to_datum().ok_or_else(wrong)?;
+            Ok(Score::One(dist.log_density(&x)))
+        }
         Value::List(xs) => sum_scores(xs.len(), |i| xs[i].to_datum().map(|x| dist.log_density(&x)).ok_or_else(wrong)),
         Value::Array(xs) => Ok(Score::One(dist.log_density(&Datum::Vec(std::sync::Arc::clone(xs))))),
         _ => Err(wrong()),

@@ -1,0 +1,66 @@
+//! The Cauchy distribution: Student's t with one degree of freedom.
+
+use super::draw::{log1p_square, standard};
+use super::param::{finite, positive};
+use super::{ParamError, Scalar, Slope, Support};
+use crate::rng::Stream;
+
+/// `cauchy(location, scale)`. It has no mean.
+#[derive(Clone, Copy, Debug, PartialEq)]
+pub struct Cauchy {
+    location: f64,
+    scale: f64,
+    log_norm: f64,
+}
+
+impl Cauchy {
+    /// Around this location, with this median distance from it; fails unless the location is finite and the scale positive and
+    /// finite.
+    pub fn new(location: f64, scale: f64) -> Result<Cauchy, ParamError> {
+        let (location, scale) = (finite(Self::NAME, "location", location)?, positive(Self::NAME, "scale", scale)?);
+        Ok(Cauchy { location, scale, log_norm: libm::log(core::f64::consts::FRAC_1_PI) - libm::log(scale) })
+    }
+}
+
+impl Scalar for Cauchy {
+    const NAME: &'static str = "cauchy";
+
+    fn number_support(&self) -> Support {
+        Support::Real
+    }
+
+    fn draw(&self, rng: &mut Stream) -> f64 {
+        // The tangent of a small angle is as exact as the angle, so far draws are not of a few values only.
+        let size = 1.0 / libm::tan(core::f64::consts::FRAC_PI_2 * rng.open_uniform());
+        let sign = if rng.next_u64() & 1 == 0 { 1.0 } else { -1.0 };
+        (self.location + self.scale * (sign * size)).clamp(f64::MIN, f64::MAX)
+    }
+
+    #[inline]
+    fn log_density_num(&self, x: f64) -> f64 {
+        if x.is_finite() {
+            self.log_norm - log1p_square(standard(x, self.location, self.scale))
+        } else {
+            f64::NEG_INFINITY
+        }
+    }
+
+    fn slope(&self, x: f64) -> Slope {
+        let z = standard(x, self.location, self.scale);
+        // 2 z / (1 + z^2) and z times it, with no overflow.
+        let (once, twice) = if z.abs() < 1.0 {
+            (2.0 * z / (1.0 + z * z), 2.0 * z * z / (1.0 + z * z))
+        } else {
+            (2.0 / (z + 1.0 / z), 2.0 / (1.0 + 1.0 / z / z))
+        };
+        Slope::new(-once / self.scale, [once / self.scale, (twice - 1.0) / self.scale])
+    }
+
+    fn number_mean(&self) -> Option<f64> {
+        None
+    }
+
+    fn number_sd(&self) -> Option<f64> {
+        None
+    }
+}

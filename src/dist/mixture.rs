@@ -1,0 +1,165 @@
+//! Mixtures: a value of one of several distributions, it is not known which.
+
+use super::{Categorical, Datum, Dist, Distribution, Gradient, ParamError, Scalar, Support};
+use crate::num::log_sum_exp;
+use crate::rng::{Purpose, Stream, StreamKey};
+
+/// `mixture(weights, components)`. The density is the weighted mean of the components' densities.
+///
+/// Its support is that of the components if they agree; for numbers, else the least interval around theirs. Components store
+/// values: white noise behind a Gaussian one is not kept. Gradients by parameters are by the weights, then by those of each component.
+#[derive(Clone, Debug)]
+pub struct Mixture {
+    weights: Categorical,
+    log_shares: Box<[f64]>,
+    total: f64,
+    components: Box<[Dist]>,
+    support: Support,
+}
+
+impl Mixture {
+    /// Fails unless there is a component, a weight for each, the weights are finite and not negative with a positive, finite
+    /// sum, and the components are proper and have the same kind of values.
+    pub fn new(weights: &[f64], components: Vec<Dist>) -> Result<Mixture, ParamError> {
+        let bad = |parameter, value: String, rule| ParamError::new("mixture", parameter, value, rule);
+        if weights.len() != components.len() {
+            let value = format!("{} for {}", weights.len(), components.len());
+            return Err(bad("weights", value, "must have a number for each component"));
+        }
+        let choice = Categorical::new(weights).map_err(|e| ParamError { distribution: "mixture", ..e })?;
+        if let Some(c) = components.iter().find(|c| c.is_improper()) {
+            return Err(bad("components", c.name().into(), "must be proper distributions"));
+        }
+        let components: Box<[Dist]> = components.into_iter().map(Dist::centred).collect();
+        let mut supports = components.iter().map(|c| plain(c.support()));
+        let first = supports.next().ok_or_else(|| bad("components", "none".into(), "must not be empty"))?;
+        let names = || components.iter().map(Dist::name).collect::<Vec<_>>().join(", ");
+        let support = supports
+            .try_fold(first, union)
+            .ok_or_else(|| bad("components", names(), "must have the same kind of values"))?;
+        let total: f64 = weights.iter().sum();
+        let log_shares = weights.iter().map(|w| libm::log(*w) - libm::log(total)).collect();
+        Ok(Mixture { weights: choice, log_shares, total, components, support })
+    }
+
+    /// The components' log densities, weights not counted.
+    fn scores(&self, x: &Datum) -> Vec<f64> {
+        self.components.iter().map(|c| c.log_density(x)).collect()
+    }
+
+    /// The log density: a component without weight counts for nothing, not even at its poles.
+    fn total_score(&self, scores: &[f64]) -> f64 {
+        let weighted = self.log_shares.iter().zip(scores).filter(|(w, _)| **w > f64::NEG_INFINITY);
+        log_sum_exp(&weighted.map(|(w, s)| w + s).collect::<Vec<_>>())
+    }
+
+    /// The probability that a value is of each component; nothing where the density is not positive and finite.
+    pub fn responsibilities(&self, x: &Datum) -> Option<Vec<f64>> {
+        let scores = self.scores(x);
+        let all = self.total_score(&scores);
+        let share = |(w, s): (&f64, &f64)| if *w > f64::NEG_INFINITY { libm::exp(w + s - all) } else { 0.0 };
+        all.is_finite().then(|| self.log_shares.iter().zip(&scores).map(share).collect())
+    }
+}
+
+/// Vectors of any numbers under one name.
+fn plain(s: Support) -> Support {
+    match s {
+        Support::Product(one, n) if *one == Support::Real => Support::Vector(n),
+        Support::Each(all) if all.iter().all(|s| *s == Support::Real) => Support::Vector(all.len()),
+        other => other,
+    }
+}
+
+/// The bounds of an interval of numbers.
+fn bounds(s: &Support) -> Option<(f64, f64)> {
+    Some(match s {
+        Support::Real => (f64::NEG_INFINITY, f64::INFINITY),
+        Support::Positive => (0.0, f64::INFINITY),
+        Support::AtLeast { lo } => (*lo, f64::INFINITY),
+        Support::AtMost { hi } => (f64::NEG_INFINITY, *hi),
+        Support::Interval { lo, hi } => (*lo, *hi),
+        Support::Circle => (-core::f64::consts::PI, core::f64::consts::PI),
+        _ => return None,
+    })
+}
+
+/// The least space around two; `None` if their values are of different kinds.
+fn union(a: Support, b: Support) -> Option<Support> {
+    if a == b {
+        return Some(a);
+    }
+    if let (Support::Integers { lo: a, hi: i }, Support::Integers { lo: b, hi: j }) = (&a, &b) {
+        return Some(Support::Integers { lo: *a.min(b), hi: i.zip(*j).map(|(i, j)| i.max(j)) });
+    }
+    let ((a, i), (b, j)) = (bounds(&a)?, bounds(&b)?);
+    let (lo, hi) = (a.min(b), i.max(j));
+    Some(match (lo == f64::NEG_INFINITY, hi == f64::INFINITY) {
+        (true, true) => Support::Real,
+        (false, true) => Support::AtLeast { lo },
+        (true, false) => Support::AtMost { hi },
+        (false, false) => Support::Interval { lo, hi },
+    })
+}
+
+/// How many derivatives by parameters a distribution has: those at a draw of it, the same one always.
+fn count_params(d: &Dist) -> usize {
+    let x = d.sample(&mut StreamKey::new(0, 0, Purpose::VALUES).stream(0, 0, 0));
+    d.gradient(&x).map_or(0, |g| g.params.len())
+}
+
+impl Distribution for Mixture {
+    fn name(&self) -> &'static str {
+        "mixture"
+    }
+
+    fn support(&self) -> Support {
+        self.support.clone()
+    }
+
+    fn sample(&self, rng: &mut Stream) -> Datum {
+        let i = self.weights.draw(rng) as usize;
+        self.components[i.min(self.components.len() - 1)].sample(rng)
+    }
+
+    fn log_density(&self, x: &Datum) -> f64 {
+        let score = self.total_score(&self.scores(x));
+        if score.is_nan() { f64::NEG_INFINITY } else { score }
+    }
+
+    fn gradient(&self, x: &Datum) -> Option<Gradient> {
+        let shares = self.responsibilities(x)?;
+        let scores = self.scores(x);
+        let all = self.total_score(&scores);
+        let dim = self.support.gradient_dim();
+        let by_weight = |s: &f64| (libm::exp(s - all).min(f64::MAX) - 1.0) / self.total;
+        let mut g = Gradient { x: vec![0.0; dim], params: scores.iter().map(by_weight).collect() };
+        for (share, c) in shares.iter().zip(&self.components) {
+            match c.gradient(x).filter(|_| *share > 0.0) {
+                Some(one) => {
+                    g.x.iter_mut().zip(&one.x).for_each(|(a, b)| *a += share * b);
+                    g.params.extend(one.params.iter().map(|p| share * p));
+                }
+                None => g.params.extend(std::iter::repeat_n(0.0, count_params(c))),
+            }
+        }
+        let finite = g.x.iter().chain(&g.params).all(|g| !g.is_nan());
+        finite.then_some(g)
+    }
+
+    fn mean(&self) -> Option<f64> {
+        let means = self.components.iter().map(Dist::mean).collect::<Option<Vec<_>>>()?;
+        Some(means.iter().zip(&self.log_shares).map(|(m, w)| m * libm::exp(*w)).sum())
+    }
+
+    /// From the spread within and between components.
+    fn sd(&self) -> Option<f64> {
+        let mean = self.mean()?;
+        let mut variance = 0.0;
+        for (c, w) in self.components.iter().zip(&self.log_shares) {
+            let (m, sd) = (c.mean()?, c.sd()?);
+            variance += libm::exp(*w) * (sd * sd + (m - mean) * (m - mean));
+        }
+        Some(variance.sqrt())
+    }
+}

@@ -1,0 +1,77 @@
+//! The Weibull distribution.
+
+use super::draw::representable;
+use super::param::positive;
+use super::{ParamError, Scalar, Slope, Support};
+use crate::num::ln_gamma;
+use crate::rng::Stream;
+
+/// `weibull(shape, scale)`: (x / scale)^shape is exponential with rate 1.
+#[derive(Clone, Copy, Debug, PartialEq)]
+pub struct Weibull {
+    shape: f64,
+    scale: f64,
+    log_norm: f64,
+}
+
+impl Weibull {
+    /// With this shape and scale; fails unless both are positive and finite.
+    pub fn new(shape: f64, scale: f64) -> Result<Weibull, ParamError> {
+        let (shape, scale) = (positive(Self::NAME, "shape", shape)?, positive(Self::NAME, "scale", scale)?);
+        Ok(Weibull { shape, scale, log_norm: libm::log(shape) })
+    }
+
+    /// ln(x / scale), also where the ratio is no double.
+    fn log_ratio(&self, x: f64) -> f64 {
+        let t = x / self.scale;
+        if t >= f64::MIN_POSITIVE && t.is_finite() { libm::log(t) } else { libm::log(x) - libm::log(self.scale) }
+    }
+}
+
+impl Scalar for Weibull {
+    const NAME: &'static str = "weibull";
+
+    fn number_support(&self) -> Support {
+        Support::Positive
+    }
+
+    fn draw(&self, rng: &mut Stream) -> f64 {
+        let waiting = -libm::log(rng.open_uniform());
+        representable(libm::exp(libm::log(self.scale) + libm::log(waiting) / self.shape))
+    }
+
+    #[inline]
+    fn log_density_num(&self, x: f64) -> f64 {
+        if !(x > 0.0 && x.is_finite()) {
+            return f64::NEG_INFINITY;
+        }
+        let power = self.shape * self.log_ratio(x);
+        let fall = libm::exp(power);
+        if fall == f64::INFINITY { f64::NEG_INFINITY } else { self.log_norm + power - libm::log(x) - fall }
+    }
+
+    fn slope(&self, x: f64) -> Slope {
+        let log_ratio = self.log_ratio(x);
+        let excess = libm::expm1(self.shape * log_ratio);
+        let by_x = -(1.0 + self.shape * excess) / x;
+        Slope::new(by_x, [1.0 / self.shape - log_ratio * excess, self.shape * (excess / self.scale)])
+    }
+
+    fn number_mean(&self) -> Option<f64> {
+        let mean = self.scale * libm::exp(ln_gamma(1.0 + 1.0 / self.shape));
+        mean.is_finite().then_some(mean)
+    }
+
+    fn number_sd(&self) -> Option<f64> {
+        let e = 1.0 / self.shape;
+        // ln(1 + var / mean^2); by the zeta values' series where the plain difference would cancel.
+        let log_ratio = if e < 1e-3 {
+            let (two, three, four) = (1.644_934_066_848_226_4, 1.202_056_903_159_594, 1.082_323_233_711_138);
+            e * e * (two - e * (2.0 * three - e * 3.5 * four))
+        } else {
+            ln_gamma(1.0 + 2.0 * e) - 2.0 * ln_gamma(1.0 + e)
+        };
+        let sd = self.number_mean()? * libm::expm1(log_ratio).sqrt();
+        sd.is_finite().then_some(sd)
+    }
+}
