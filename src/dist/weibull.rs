@@ -36,8 +36,10 @@ impl Scalar for Weibull {
     }
 
     fn draw(&self, rng: &mut Stream) -> f64 {
-        let waiting = -libm::log(rng.open_uniform());
-        representable(libm::exp(libm::log(self.scale) + libm::log(waiting) / self.shape))
+        let power = libm::log(-libm::log(rng.open_uniform())) / self.shape;
+        // For a large shape the factor is near 1, where a detour by the logarithm of the scale would be coarser than the spread.
+        let far = power.abs() > 700.0;
+        representable(if far { libm::exp(libm::log(self.scale) + power) } else { self.scale * libm::exp(power) })
     }
 
     #[inline]

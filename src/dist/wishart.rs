@@ -4,7 +4,7 @@ use super::draw::ln_gamma_draw;
 use super::factor::Factor;
 use super::param::positive;
 use super::triangle;
-use super::{Datum, Distribution, Gradient, ParamError, Support};
+use super::{Datum, Distribution, Gamma, Gradient, ParamError, Scalar, Support};
 use crate::num::{LN_SQRT_2PI, digamma, ln_gamma};
 use crate::rng::Stream;
 use core::f64::consts::LN_2;
@@ -41,12 +41,8 @@ impl Wishart {
         if df <= (n - 1) as f64 {
             return Err(ParamError::new("wishart", "df", df, "must be above the number of rows less 1"));
         }
-        let diagonal = |i: usize| {
-            let half = 0.5 * (df - i as f64);
-            let jacobian = (i + 1) as f64 * libm::log(scale_chol[(i, i)]);
-            (1.0 - half) * LN_2 - ln_gamma(half) - LN_SQRT_2PI * i as f64 - jacobian
-        };
-        let log_norm = (0..n).map(diagonal).sum();
+        let jacobian = |i: usize| (i + 1) as f64 * libm::log(scale_chol[(i, i)]) + LN_SQRT_2PI * i as f64;
+        let log_norm = -(0..n).map(jacobian).sum::<f64>();
         Ok(Wishart { df, scale, log_norm })
     }
 
@@ -61,6 +57,15 @@ impl Wishart {
             }
         }
         a
+    }
+}
+
+/// The log density of the root of a chi-squared number; by that of a gamma number where the plain formula would cancel.
+fn log_chi(df: f64, x: f64) -> f64 {
+    let (half, t) = (0.5 * df, 0.5 * x * x);
+    match Gamma::new(half, 1.0) {
+        Ok(gamma) if half >= 64.0 && t > 0.0 => gamma.log_density_num(t) + libm::log(x),
+        _ => (1.0 - half) * LN_2 - ln_gamma(half) + (df - 1.0) * libm::log(x) - t,
     }
 }
 
@@ -99,9 +104,9 @@ impl Distribution for Wishart {
             return f64::NEG_INFINITY;
         };
         let a = self.whiten(&xs);
-        let square: f64 = a.iter().map(|a| a * a).sum();
-        let power: f64 = (0..n).map(|i| (self.df - i as f64 - 1.0) * libm::log(a[i * n + i])).sum();
-        let score = self.log_norm + power - 0.5 * square;
+        let noise: f64 = (0..n).flat_map(|i| &a[i * n..i * n + i]).map(|a| a * a).sum();
+        let diagonal: f64 = (0..n).map(|i| log_chi(self.df - i as f64, a[i * n + i])).sum();
+        let score = self.log_norm + diagonal - 0.5 * noise;
         if score.is_nan() { f64::NEG_INFINITY } else { score }
     }
 

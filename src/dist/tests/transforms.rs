@@ -34,9 +34,11 @@ fn supports() -> Vec<Support> {
     ]
 }
 
-fn points(n: usize) -> Vec<Vec<f64>> {
+fn points(s: &Support) -> Vec<Vec<f64>> {
     let mut rng = stream(500);
-    (0..20).map(|_| (0..n).map(|_| 2.0 * rng.standard_normal()).collect()).collect()
+    // Gaps add up: far ones would leave an interval to rounding.
+    let spread = if matches!(s, Support::Ascending(one, _) if **one != Support::Real) { 0.5 } else { 2.0 };
+    (0..20).map(|_| (0..s.free_dim()).map(|_| spread * rng.standard_normal()).collect()).collect()
 }
 
 /// Whether two coordinates are of the same point; those of angles go around.
@@ -49,7 +51,7 @@ fn same(s: &Support, a: f64, b: f64) -> bool {
 #[test]
 fn there_and_back() {
     for s in supports() {
-        for y in points(s.free_dim()) {
+        for y in points(&s) {
             let (x, jacobian) = s.from_free(&y);
             assert!(s.contains(&x) && s.fits(&x) && jacobian.is_finite(), "{s:?} {x:?}");
             let mut back = vec![7.0];
@@ -79,7 +81,7 @@ fn independent(s: &Support, x: &Datum) -> Vec<f64> {
 fn jacobians_are_those_of_finite_differences() {
     for s in supports() {
         let n = s.free_dim();
-        for y in points(n) {
+        for y in points(&s) {
             let column = |j: usize| {
                 let moved = |h: f64| {
                     let mut y = y.clone();
@@ -104,7 +106,7 @@ fn gradients_pull_back() {
     let weight = |i: usize| 0.5 + i as f64;
     let log_p = |x: &Datum| numbers(x).iter().enumerate().map(|(i, x)| (weight(i) * x).sin()).sum::<f64>();
     for s in supports() {
-        for y in points(s.free_dim()) {
+        for y in points(&s) {
             let total = |y: &[f64]| {
                 let (x, jacobian) = s.from_free(y);
                 log_p(&x) + jacobian
