@@ -1,8 +1,10 @@
-//! Solids: meshes placed in the world, alone or in groups. Cheap to clone and to move: meshes are shared.
+//! Solids: meshes placed in the world, alone or in groups, and their named points. Cheap to clone and to move: meshes are
+//! shared.
 //!
-//! Not a volume: members may overlap, nothing is cut or merged. Invariant: a member's parts are numbered after those of the
-//! members before it (numbers beyond 65534 are all drawn as that one).
+//! Not a volume: members may overlap, nothing is cut or merged. Invariants: a member's parts are numbered after those of
+//! the members before it (numbers beyond 65534 are all drawn as that one); no two landmarks have the same name.
 
+use super::landmark::{Landmark, unique};
 use super::mesh::{MOST_PARTS, MOST_TRIANGLES};
 use super::{Affine, Bounds, Edge, GeomError, Mesh, NO_FACE, Topology};
 use glam::DVec3;
@@ -23,12 +25,26 @@ pub struct Instance {
 #[derive(Clone, Debug)]
 pub struct Solid {
     instances: Arc<[Instance]>,
+    landmarks: Arc<[Landmark]>,
 }
 
 impl Solid {
     /// A mesh as it is.
     pub fn new(mesh: Arc<Mesh>) -> Solid {
-        Solid { instances: Arc::new([Instance { mesh, affine: Affine::IDENTITY, first_part: 0 }]) }
+        let instance = Instance { mesh, affine: Affine::IDENTITY, first_part: 0 };
+        Solid { instances: Arc::new([instance]), landmarks: Arc::default() }
+    }
+
+    /// The same with these named points in place of its own (world coordinates); a name that occurs again gets `#2`, `#3`, …
+    /// appended.
+    #[must_use]
+    pub fn with_landmarks(self, landmarks: impl Into<Arc<[Landmark]>>) -> Solid {
+        Solid { landmarks: unique(landmarks.into().iter().cloned()), ..self }
+    }
+
+    /// Its named points, in world coordinates.
+    pub fn landmarks(&self) -> &[Landmark] {
+        &self.landmarks
     }
 
     /// Its meshes.
@@ -39,10 +55,11 @@ impl Solid {
     /// Moved by an affine map.
     pub fn placed(&self, by: Affine) -> Solid {
         let instances = self.instances.iter().map(|i| Instance { affine: by * i.affine, ..i.clone() });
-        Solid { instances: instances.collect() }
+        let landmarks = self.landmarks.iter().map(|l| Landmark { position: by.point(l.position), ..l.clone() });
+        Solid { instances: instances.collect(), landmarks: landmarks.collect() }
     }
 
-    /// Several together; part numbers follow one another.
+    /// Several together; part numbers follow one another, and so do landmarks.
     pub fn group(solids: &[Solid]) -> Solid {
         let mut first: u16 = 0;
         let mut instances = Vec::new();
@@ -52,7 +69,8 @@ impl Solid {
             }
             first = first.saturating_add(s.part_count());
         }
-        Solid { instances: instances.into() }
+        let landmarks = solids.iter().flat_map(|s| s.landmarks.iter().cloned());
+        Solid { instances: instances.into(), landmarks: unique(landmarks) }
     }
 
     /// The number of parts.
@@ -160,6 +178,23 @@ mod tests {
             let extreme = block(DVec3::ONE).placed(Affine::new(DVec3::ZERO, DVec3::ZERO, DVec3::splat(scale)));
             assert!(extreme.centred(true).instances().iter().all(|i| i.affine.is_finite()), "{scale}");
         }
+    }
+
+    #[test]
+    fn landmarks_go_where_their_solid_goes() {
+        let at = |name: &str, position| Landmark { name: Arc::from(name), position };
+        let tip = DVec3::new(0.0, 2.0, 0.0);
+        let arm = block(DVec3::new(1.0, 4.0, 1.0)).with_landmarks([at("elbow", DVec3::ZERO), at("hand", tip)]);
+        let turned = Affine::new(DVec3::X, DVec3::new(0.0, 0.0, std::f64::consts::FRAC_PI_2), DVec3::splat(3.0));
+        let two = Solid::group(&[arm.clone(), arm.placed(turned), block(DVec3::ONE)]);
+        let names: Vec<&str> = two.landmarks().iter().map(|l| &*l.name).collect();
+        assert_eq!(names, ["elbow", "hand", "elbow#2", "hand#2"]);
+        assert!((two.landmarks()[3].position - DVec3::new(-5.0, 0.0, 0.0)).length() < 1e-12);
+        let lifted = arm.placed(Affine::new(DVec3::Y, DVec3::ZERO, DVec3::ONE));
+        let fit = lifted.centred(true);
+        assert!((fit.landmarks()[1].position - DVec3::Y).length() < 1e-6, "half the longest edge is 1 now");
+        assert!(fit.landmarks()[0].position.length() < 1e-6);
+        assert!(block(DVec3::ONE).landmarks().is_empty());
     }
 
     #[test]

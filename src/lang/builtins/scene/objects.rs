@@ -25,6 +25,9 @@ impl Object for SolidValue {
         match name {
             "size" => bounds().map(|b| Value::array(b.size().to_array())),
             "height" => bounds().map(|b| Value::Num(b.size().y)),
+            "landmarks" => Some(Value::Record(Arc::new(
+                self.0.landmarks().iter().map(|l| (Arc::clone(&l.name), Value::array(l.position.to_array()))).collect(),
+            ))),
             _ => None,
         }
     }
