@@ -4,13 +4,14 @@
 //! [`crate::vision`]; here their values become values of the language.
 
 mod compare;
+mod compare_keypoints;
 mod objects;
 mod observed;
 mod seeing;
 mod shapes;
 
 pub use objects::{AffineValue, CameraValue, SolidValue, ViewValue};
-pub use observed::{DepthValue, ImageValue, MaskValue};
+pub use observed::{DepthValue, ImageValue, KeypointsValue, MaskValue};
 
 use super::{Arg, Args, Builtin, Kind, Type};
 use crate::geom::GeomError;
@@ -36,7 +37,7 @@ const fn native(
 
 /// All of them.
 pub(super) fn all() -> impl Iterator<Item = Builtin> {
-    [shapes::TABLE, seeing::TABLE, compare::TABLE].into_iter().flatten().copied()
+    [shapes::TABLE, seeing::TABLE, compare::TABLE, compare_keypoints::TABLE].into_iter().flatten().copied()
 }
 
 /// A shape that cannot be made: numbers outside their domain reject a proposal, anything else ends the run.
