@@ -53,6 +53,20 @@ fn no_detections_have_the_log_density_zero() {
 }
 
 #[test]
+fn programs_read_landmarks() {
+    let text = "include \"std/scene.pcad\" as scene;
+        let arm = scene.landmarks(scene.sphere(1), { hand: [0, 2, 0], elbow: [0, 1, 0] });
+        let both = scene.group([arm, scene.affine(translate = [5, 0, 0], scale = 3) * arm]).landmarks;
+        assume x ~ normal(both[\"hand#2\"][0] + both.elbow[1], 1);
+        observe normal(both[\"elbow#2\"][1], 1) = 3;";
+    let t = Model::from_text(text).unwrap_or_else(|e| panic!("{e}")).simulate(1, 0).unwrap();
+    assert!((t.log_likelihood() + 0.5 * f64::ln(std::f64::consts::TAU)).abs() < 1e-12, "{}", t.log_likelihood());
+    let wrong = text.replace("{ hand: [0, 2, 0]", "{ hand: [0, 2]");
+    let said = Model::from_text(&wrong).unwrap().simulate(1, 0).unwrap_err().to_string();
+    assert!(said.contains("scene.landmarks: `points` must be a record of points [x, y, z]"), "{said}");
+}
+
+#[test]
 fn the_likelihood_is_that_of_the_projected_landmarks() {
     // The default camera shows 4.4 units over 440 pixels at its own depth of 8.
     let m = model(Some("{\"nose\": [250, 20], \"l_ankle\": [230, 205, 0.25], \"r_ear\": [5, 5]}"));
