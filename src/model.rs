@@ -12,7 +12,7 @@
 use crate::diag::{Diagnostic, IntoDiagnostic, Severity, SourceMap, render};
 use crate::infer::draws::Sink;
 use crate::infer::{ChainError, ChainResult, Progress, RunOptions, default_plan, run_chains};
-use crate::lang::builtins::scene::{CameraValue, DepthValue, ImageValue, MaskValue};
+use crate::lang::builtins::scene::{CameraValue, DepthValue, ImageValue, KeypointsValue, MaskValue};
 use crate::lang::builtins::{Table, data};
 use crate::lang::code::Code;
 use crate::lang::error::{Fault, FaultKind, RunError};
@@ -167,9 +167,10 @@ impl Program {
     pub fn observe_file(self, name: &str, path: &str) -> Result<Program, Error> {
         let kind = self.interface().data.iter().find(|d| d.name == name).and_then(|d| d.ty.clone());
         let kind = kind.unwrap_or_else(|| "image".into());
-        let loaded = match std::fs::read(path) {
+        let file = data::path_of(&kind, path);
+        let loaded = match std::fs::read(file) {
             Ok(bytes) => data::load(&kind, path, &bytes, &|other| sibling(&Disk, path, other)),
-            Err(e) => Err(Fault::new(FaultKind::Other, format!("cannot read {path}: {}", reason(&e)))),
+            Err(e) => Err(Fault::new(FaultKind::Other, format!("cannot read {file}: {}", reason(&e)))),
         };
         match loaded {
             Ok(value) => Ok(self.observe(name, value)),
@@ -197,19 +198,27 @@ impl Program {
         self.default_argument(RENDER.0, RENDER.1, Value::object(CameraValue(camera)))
     }
 
-    /// Without a camera, the default view in the shape of the first picture given.
+    /// Without a camera, the default view in the shape of the first picture given, or of that of keypoints. Keypoints that do
+    /// not say which picture they belong to belong to the first one.
     fn default_camera(&mut self) {
+        let picture = self.data.values().find_map(|v| {
+            let image = v.downcast::<ImageValue>().map(ImageValue::size);
+            let mask = || v.downcast::<MaskValue>().map(|m| (m.mask.width(), m.mask.height()));
+            let depth = || v.downcast::<DepthValue>().map(|d| (d.depth.width(), d.depth.height()));
+            image.or_else(mask).or_else(depth)
+        });
+        if let Some((width, height)) = picture {
+            for v in self.data.values_mut() {
+                if let Some(KeypointsValue(k)) = v.downcast::<KeypointsValue>() {
+                    *v = Value::object(KeypointsValue(k.clone().in_image(width, height)));
+                }
+            }
+        }
         if self.defaults.contains_key(&RENDER) {
             return;
         }
-        let size = self.data.values().find_map(|v| match v {
-            v if v.downcast::<ImageValue>().is_some() => v.downcast::<ImageValue>().map(ImageValue::size),
-            v if v.downcast::<MaskValue>().is_some() => {
-                v.downcast::<MaskValue>().map(|m| (m.mask.width(), m.mask.height()))
-            }
-            v => v.downcast::<DepthValue>().map(|d| (d.depth.width(), d.depth.height())),
-        });
-        if let Some((width, height)) = size {
+        let keypoints = || self.data.values().find_map(|v| v.downcast::<KeypointsValue>().and_then(|k| k.0.size()));
+        if let Some((width, height)) = picture.or_else(keypoints) {
             let camera = CameraValue(Camera::default_for(width, height));
             self.defaults.insert(RENDER, Value::object(camera));
         }
@@ -224,9 +233,10 @@ impl Program {
         let loader = &*self.loader;
         let read_data = |kind: &str, path: &str, folder: &str| {
             let beside = format!("{folder}{path}");
-            match read(loader, &beside) {
+            let file = data::path_of(kind, &beside);
+            match read(loader, file) {
                 Ok((bytes, _)) => data::load(kind, &beside, &bytes, &|other| sibling(loader, &beside, other)),
-                Err(e) => Err(Fault::new(FaultKind::Other, format!("cannot read {beside}: {}", reason(&e)))),
+                Err(e) => Err(Fault::new(FaultKind::Other, format!("cannot read {file}: {}", reason(&e)))),
             }
         };
         let inputs = Inputs {

@@ -54,6 +54,10 @@ pub struct Run {
     /// A ready contour map (bright is contour) in place of the photograph's own contours
     #[arg(long, value_name = "FILE")]
     pub observe_contours: Option<PathBuf>,
+    /// What a pose detector found: a file for the only `data` item of keypoints. `#ID` chooses one of several people; without it
+    /// the one called like the photograph's file
+    #[arg(long, value_name = "FILE[#ID]")]
+    pub keypoints: Option<String>,
     /// The seed: same seed, same draws
     #[arg(long, default_value_t = 1)]
     pub seed: u64,

@@ -4,6 +4,7 @@ use super::args::{Given, Run};
 use super::{Failure, files, plain};
 use image::DynamicImage;
 use pcadlang::Program;
+use pcadlang::lang::builtins::data;
 use pcadlang::lang::builtins::scene::ImageValue;
 use pcadlang::lang::value::Value;
 use pcadlang::render::Camera;
@@ -29,25 +30,39 @@ pub fn program(given: &Given, quiet: bool) -> Result<Program, Failure> {
     Ok(program)
 }
 
-/// Binds the files of `--observe` and `--observe-contours`; gives the photograph among them.
+/// Binds the files of `--observe`, `--keypoints` and `--observe-contours`; gives the photograph among them.
 pub fn observe(mut program: Program, a: &Run) -> Result<(Program, Option<Photo>), Failure> {
     let mut image: Option<(String, Photo)> = None;
+    let mut stem: Option<String> = None;
+    let mut detected: Vec<(String, String)> = Vec::new();
     for spec in &a.observe {
         let (name, path) = named(&program, spec)?;
         let kind = program.interface().data.iter().find(|d| d.name == name).and_then(|d| d.ty.clone());
-        if kind.as_deref() == Some("image") {
-            let photo = decode(Path::new(&path))?;
-            program = program.observe(&name, Value::object(ImageValue::photo(photo.clone())));
-            image = Some((name, photo));
-        } else {
-            program = program.observe_file(&name, &path)?;
+        match kind.as_deref() {
+            Some("image") => {
+                let photo = decode(Path::new(&path))?;
+                program = program.observe(&name, Value::object(ImageValue::photo(photo.clone())));
+                stem = Path::new(&path).file_stem().and_then(|s| s.to_str()).map(str::to_owned);
+                image = Some((name, photo));
+            }
+            // Who is meant may depend on the photograph, which may come later.
+            Some("keypoints") => detected.push((name, path)),
+            _ => program = program.observe_file(&name, &path)?,
         }
+    }
+    if let Some(path) = &a.keypoints {
+        detected.push((only(&program, "keypoints", "--keypoints")?, path.clone()));
+    }
+    for (name, path) in detected {
+        let bytes = files::read(Path::new(data::path_of("keypoints", &path)))?;
+        let found = data::load_keypoints(&path, &bytes, stem.as_deref());
+        program = program.observe(&name, found.map_err(|f| Failure::Plain(f.message, f.hint))?);
     }
     if let Some(path) = &a.observe_contours {
         let map = ContourMap::from_image(&DynamicImage::from(decode(path)?.rgb().clone()).to_luma8());
         let name = match &image {
             Some((name, _)) => name.clone(),
-            None => only_image(&program)?,
+            None => only(&program, "image", "--observe")?,
         };
         let photo = image.as_ref().map(|(_, p)| p.clone());
         program = program.observe(&name, Value::object(ImageValue::contours(map, photo)));
@@ -73,26 +88,28 @@ fn named(program: &Program, spec: &str) -> Result<(String, String), Failure> {
     if let [one] = open[..] {
         return Ok((one.name.clone(), spec.to_owned()));
     }
-    only_image(program).map(|name| (name, spec.to_owned()))
+    only(program, "image", "--observe").map(|name| (name, spec.to_owned()))
 }
 
-/// The only `data` item that is an image.
-fn only_image(program: &Program) -> Result<String, Failure> {
+/// The only `data` item of a kind, for an option that may leave out the name.
+fn only(program: &Program, kind: &str, option: &str) -> Result<String, Failure> {
     let data = program.interface().data;
-    let images: Vec<&str> = data.iter().filter(|d| d.ty.as_deref() == Some("image")).map(|d| d.name.as_str()).collect();
-    match images[..] {
+    let fit: Vec<&str> = data.iter().filter(|d| d.ty.as_deref() == Some(kind)).map(|d| d.name.as_str()).collect();
+    let (one, many) = if kind == "image" { ("image", "images") } else { (kind, kind) };
+    match fit[..] {
         [one] => Ok(one.to_owned()),
-        [] if data.is_empty() => Err(plain("the program observes no data; leave out --observe")),
+        [] if data.is_empty() => Err(plain(format!("the program observes no data; leave out {option}"))),
         [] => {
             let names: Vec<&str> = data.iter().map(|d| d.name.as_str()).collect();
-            Err(Failure::Plain(
-                "the program observes no image".into(),
-                Some(format!("name the item: --observe NAME=FILE, one of {}", names.join(", "))),
-            ))
+            let hint = match kind {
+                "keypoints" => "give it an item to observe: data points = keypoints();".to_owned(),
+                _ => format!("name the item: --observe NAME=FILE, one of {}", names.join(", ")),
+            };
+            Err(Failure::Plain(format!("the program observes no {one}"), Some(hint)))
         }
         _ => Err(Failure::Plain(
-            "the program observes several images".into(),
-            Some(format!("name the item: --observe NAME=FILE, one of {}", images.join(", "))),
+            format!("the program observes several {many}"),
+            Some(format!("name the item: --observe NAME=FILE, one of {}", fit.join(", "))),
         )),
     }
 }

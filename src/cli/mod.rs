@@ -6,6 +6,7 @@ mod contours;
 mod doc;
 mod files;
 mod given;
+mod keypoints;
 mod progress;
 mod run;
 mod sample;

@@ -1,11 +1,12 @@
 //! `pcadlang run`: chains, their draws as they come, then pictures, tables and a page.
 
 use super::args::Run;
+use super::keypoints::Joints;
 use super::{Failure, given, plain, progress, scene};
 use image::GrayImage;
 use pcadlang::geom::{Mesh, Solid, glb, obj};
 use pcadlang::infer::draws::{KernelStats, Sink};
-use pcadlang::infer::{ChainResult, Progress};
+use pcadlang::infer::{ChainResult, Progress, Watch};
 use pcadlang::lang::builtins::scene::{SolidValue, ViewValue};
 use pcadlang::render::View;
 use pcadlang::report::html::{MeshData, Page, page};
@@ -49,7 +50,9 @@ pub fn run(a: &Run) -> Result<(), Failure> {
 
     let memories: Vec<Memory> = (0..a.chains).map(|_| Memory::default()).collect();
     let sinks = sinks(&dir, a, &model, &memories)?;
-    let (progress, done) = (Arc::new(Progress::default()), AtomicBool::new(false));
+    let joints = Joints::new(a.chains, photo.as_ref().map(|p| (p.width(), p.height())));
+    let watch = Some(Box::new(joints.clone()) as Box<dyn Watch>);
+    let (progress, done) = (Arc::new(Progress { watch, ..Progress::default() }), AtomicBool::new(false));
     let cancel = Arc::clone(&progress);
     // A second handler cannot be set; then the system's own stays.
     let _ = ctrlc::set_handler(move || cancel.cancelled.store(true, Ordering::Relaxed));
@@ -79,6 +82,10 @@ pub fn run(a: &Run) -> Result<(), Failure> {
     let warnings = table::warnings(&quantities, &kernels, chains.len());
     write_summary(&dir, &quantities, &kernels, &warnings)?;
     let drawn = best_draw(&dir, a, &model, &chains, photo.as_ref())?;
+    let found = drawn.view.as_ref().and_then(|v| joints.report(v, begun.elapsed().as_secs_f64()));
+    if let Some(found) = found {
+        write(&dir, "keypoints.json", &serde_json::to_vec_pretty(&found).unwrap_or_default())?;
+    }
     let steps: Vec<_> = chains
         .iter()
         .map(|c| json!({ "steps": c.steps, "warmup": c.warmup, "draws": c.draws, "seconds": c.seconds }))
@@ -122,6 +129,11 @@ fn sinks(dir: &RunDir, a: &Run, model: &Model, memories: &[Memory]) -> Result<Ve
     Ok(sinks)
 }
 
+/// What is given to observe, as `--observe` has it.
+fn observed(a: &Run) -> impl Iterator<Item = String> {
+    a.observe.iter().cloned().chain(a.keypoints.iter().map(|k| format!("keypoints={k}")))
+}
+
 fn settings(a: &Run, model: &Model, elapsed: f64) -> Vec<(&'static str, String)> {
     let mut all = vec![
         ("version", env!("CARGO_PKG_VERSION").to_owned()),
@@ -131,7 +143,7 @@ fn settings(a: &Run, model: &Model, elapsed: f64) -> Vec<(&'static str, String)>
         ("time", seconds(elapsed)),
     ];
     all.extend(a.given.sets.iter().map(|(k, v)| ("set", format!("{k} = {v}"))));
-    all.extend(a.observe.iter().map(|o| ("observe", o.clone())));
+    all.extend(observed(a).map(|o| ("observe", o)));
     all
 }
 
@@ -143,7 +155,7 @@ fn write_run(dir: &RunDir, a: &Run, model: &Model, state: &str, more: serde_json
         "program": a.given.program,
         "program_hash": model.hash(),
         "seed": a.seed,
-        "observe": a.observe,
+        "observe": observed(a).collect::<Vec<_>>(),
         "set": a.given.sets.iter().map(|(k, v)| (k.clone(), json!(v))).collect::<serde_json::Map<_, _>>(),
         "settings": {
             "chains": a.chains, "steps": a.steps, "warmup": a.warmup,
@@ -173,6 +185,7 @@ struct Shown {
     pictures: Vec<(&'static str, Vec<u8>)>,
     positions: Vec<[f32; 3]>,
     mesh: Option<Mesh>,
+    view: Option<ViewValue>,
 }
 
 /// Rebuilds the draw with the highest log joint density, saves it, and draws it if it has a view.
@@ -193,6 +206,7 @@ fn best_draw(
     let mut shown = Shown::default();
     if let Some(view) = scene::view(&mut trace, draws, None) {
         draw(dir, &view, chains, a, photo, &mut shown)?;
+        shown.view = Some(ViewValue(view));
     }
     for x in model.exports() {
         export(dir, model, &mut trace, x, a)?;
@@ -203,7 +217,7 @@ fn best_draw(
 /// Depth, normals, mask and meshes at the input's resolution; overlay, contours and mask frequency as pictures.
 fn draw(
     dir: &RunDir,
-    view: &View,
+    view: &Arc<View>,
     chains: &[ChainResult],
     a: &Run,
     photo: Option<&Photo>,
@@ -225,7 +239,11 @@ fn draw(
     let large = pictures::picture_size(width, height);
     let (contours, picture) = (view.contours(size), view.frame(large.0.max(large.1)));
     let (strokes, drawn) = (scene::strokes(&contours), scene::drawn(&picture));
-    let overlay = encode(png(&pictures::overlay(photo.map(Photo::rgb), &drawn, &strokes)))?;
+    let mut over = pictures::overlay(photo.map(Photo::rgb), &drawn, &strokes);
+    let marked = ViewValue(Arc::clone(view));
+    let joints: Vec<[f64; 2]> = marked.landmarks(width, height).filter_map(|(_, at)| at).collect();
+    pictures::dots(&mut over, (width, height), &joints);
+    let overlay = encode(png(&over))?;
     let lines = encode(png(&pictures::contours(frame.width, frame.height, &strokes)))?;
     write(dir, "overlay.png", &overlay)?;
     write(dir, "contours.png", &lines)?;

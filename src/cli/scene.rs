@@ -2,6 +2,7 @@
 
 use pcadlang::lang::builtins::scene::{SolidValue, ViewValue};
 use pcadlang::lang::code::Operand;
+use pcadlang::lang::value::Value;
 use pcadlang::render::{Camera, Contours, Frame, View};
 use pcadlang::report::pictures::{Drawn, Strokes};
 use pcadlang::rng::{Purpose, StreamKey};
@@ -11,6 +12,13 @@ use std::sync::Arc;
 /// Where values that no observation asks for are drawn.
 pub fn predictive(seed: u64, step: u64) -> Draws {
     Draws { key: StreamKey::new(seed, u32::MAX, Purpose::PREDICT), step, lane: 0 }
+}
+
+/// Where a program keeps its view: the last top-level name that is one.
+pub fn view_operand(trace: &mut Trace, draws: Draws) -> Option<Operand> {
+    let globals: Vec<Operand> = trace.code().globals.values().rev().copied().collect();
+    let is_view = |values: Vec<Value>| values.first().is_some_and(|v| v.downcast::<ViewValue>().is_some());
+    globals.into_iter().find(|o| trace.query(&[*o], draws).is_ok_and(is_view))
 }
 
 /// The program's view: the last top-level name that is one, or the last solid before a camera.

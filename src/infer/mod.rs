@@ -19,4 +19,4 @@ pub use default_plan::default_plan;
 pub use init::{Start, StartError, starts};
 pub use kernel::{At, Kernel, Outcome, Scope};
 pub use kernels::{Block, Drift, Elliptical, Gibbs, Mh};
-pub use plan::{ChainError, ChainResult, Progress, RunOptions};
+pub use plan::{ChainError, ChainResult, Progress, RunOptions, Watch};

@@ -7,6 +7,7 @@ pub mod csv;
 mod draws;
 mod hash;
 pub mod html;
+mod moments;
 pub mod npy;
 mod number;
 pub mod pictures;
@@ -17,6 +18,7 @@ mod warnings;
 
 pub use draws::{ChainDraws, Quantity, quantities};
 pub use hash::text_hash;
+pub use moments::{Moments, Point};
 pub use number::{number, seconds};
 pub use rundir::{RunDir, RunDirError};
 pub use sinks::{Memory, Tee};

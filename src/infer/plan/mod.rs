@@ -16,6 +16,7 @@ use crate::lang::value::Value;
 use crate::rng::{Purpose, StreamKey};
 use crate::syntax::ast::{Expr, ExprKind, KStmt, KStmtKind, MixArm};
 use crate::trace::{Constraint, Draws, Limits, Selector, Trace};
+use std::fmt;
 use std::sync::Arc;
 use std::sync::atomic::{AtomicBool, AtomicU64, Ordering};
 use std::time::{Duration, Instant};
@@ -43,9 +44,18 @@ impl Default for RunOptions {
     }
 }
 
+/// Looks at the state of a chain whenever a draw is recorded.
+pub trait Watch: fmt::Debug + Send + Sync {
+    /// A draw of a chain has been recorded, and this is its state. What it asks for and no observation does is drawn from
+    /// `draws`; it must leave the state as it is. Draws of one chain come in order, chains in any.
+    fn draw(&self, chain: u32, trace: &mut Trace, draws: Draws);
+}
+
 /// What is shared between the chains and whoever watches them.
 #[derive(Debug, Default)]
 pub struct Progress {
+    /// Who looks at every draw.
+    pub watch: Option<Box<dyn Watch>>,
     /// Set to end the run at the next step.
     pub cancelled: AtomicBool,
     /// Steps of all chains.
@@ -515,6 +525,9 @@ impl Runner<'_> {
             values: self.recorder.flatten(&values),
         };
         self.sink.draw(&row).map_err(ChainError::Sink)?;
+        if let Some(watch) = &self.progress.watch {
+            watch.draw(self.chain, &mut self.trace, draws);
+        }
         self.draws += 1;
         if self.best.as_ref().is_none_or(|(b, _)| log_joint > *b) {
             self.best = Some((log_joint, self.trace.constraints()));

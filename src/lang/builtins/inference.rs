@@ -26,7 +26,6 @@ pub(super) const PLANNED: &[&str] = &[
     "rhat",
     "ess",
     "snapshot",
-    "keypoints",
 ];
 
 const fn name(
@@ -231,13 +230,6 @@ pub(super) const TABLE: &[Builtin] = &[
         &[opt("sel", Type::Selection, "@**", "The choices summarised.")],
         Type::Any,
         "Mean, sd, interval, effective sample size and R-hat of each selected choice.",
-    ),
-    name(
-        "keypoints",
-        MONITORS,
-        &[arg("view", Type::Object("view"), "A view of a scene with an armature.")],
-        Type::Any,
-        "Posterior means and spreads of the joints, in pixels of the photograph.",
     ),
     name(
         "best",

@@ -297,6 +297,9 @@ impl Lowerer<'_> {
             && let ExprKind::Var(kind) = &callee.kind
             && data::kinds().any(|k| k == &**kind)
         {
+            if let (true, Some(v)) = (args.is_empty(), data::without_file(kind)) {
+                return self.constant(v);
+            }
             let [arg] = &args[..] else {
                 self.error(format!("{kind} takes one path"), e.span, "expected one string");
                 return self.nothing();

@@ -3,11 +3,13 @@
 //! Nothing here renders a scene; it colours what was rendered. Rows go down, pixel (0, 0) is the upper left one, and its
 //! middle is at (0.5, 0.5). Buffers that are too short count as background, so no input panics.
 
+mod dots;
 mod font;
 mod sheet;
 mod strokes;
 mod surface;
 
+pub use dots::dots;
 pub use sheet::{captioned_sheet, contact_sheet};
 pub use strokes::{Strokes, contours};
 pub use surface::{Drawn, frequency, mask, overlay, shaded};

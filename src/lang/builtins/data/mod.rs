@@ -8,11 +8,12 @@ mod armature;
 mod csv;
 mod json;
 
-use super::scene::{DepthValue, ImageValue, MaskValue, SolidValue};
-use super::{Arg, Args, Builtin, Type, arg, function};
+use super::scene::{DepthValue, ImageValue, KeypointsValue, MaskValue, SolidValue};
+use super::{Arg, Args, Builtin, Type, arg, function, opt};
 use crate::geom::{Solid, obj};
 use crate::lang::error::{Fault, FaultKind};
 use crate::lang::value::Value;
+use crate::vision::keypoints::{self, Keypoints, People};
 use crate::vision::{ContourMap, Limits, VisionError, depth, mask, npy, photo};
 use std::sync::Arc;
 
@@ -43,6 +44,19 @@ pub(super) const TABLE: &[Builtin] = &[
         Type::Object("an armature"),
         "A rig file, JSON, with the mesh and morphs it names beside it: see `docs/bodies.md`.",
     ),
+    function(
+        "keypoints",
+        SECTION,
+        &[opt(
+            "file",
+            Type::Str,
+            "none",
+            "The path, relative to the program's folder; `#` and an id at its end choose a person.",
+        )],
+        Type::Object("keypoints"),
+        "The joints of a person that a pose detector found, JSON in its own layout, COCO's or MediaPipe's; none without a file.",
+        not_an_expression,
+    ),
     kind("mesh", Type::Object("a solid"), "A Wavefront OBJ mesh; each object or group in it is a part."),
 ];
 
@@ -55,6 +69,30 @@ fn not_an_expression(a: &Args) -> Result<Value, Fault> {
 /// The kinds of data that [`load`] reads: what may stand after the colon of `data d: kind;`.
 pub fn kinds() -> impl Iterator<Item = &'static str> {
     TABLE.iter().map(|b| b.name)
+}
+
+/// The value of a data item of a kind that is given no file, for those that can do without: no keypoints.
+pub fn without_file(kind: &str) -> Option<Value> {
+    (kind == "keypoints").then(|| Value::object(KeypointsValue(Keypoints::default())))
+}
+
+/// The file to read for data of a kind: what is given, but for keypoints without the `#ID` that chooses a person.
+pub fn path_of<'a>(kind: &str, file: &'a str) -> &'a str {
+    if kind == "keypoints" { keypoints::split_id(file).0 } else { file }
+}
+
+/// Keypoints from the bytes of a file: of the person whom `#ID` at the end of `file` names, or else the one whom the picture
+/// is called by, or else the only one.
+///
+/// # Errors
+/// As [`People::parse`] and [`People::pick`], with the file's name.
+pub fn load_keypoints(file: &str, bytes: &[u8], picture: Option<&str>) -> Result<Value, Fault> {
+    let (path, id) = keypoints::split_id(file);
+    let found = People::parse(bytes).and_then(|people| people.pick(id, picture));
+    found.map(|k| Value::object(KeypointsValue(k))).map_err(|e| {
+        let fault = Fault::new(FaultKind::Other, format!("{path}: {}", e.message));
+        e.hint.into_iter().fold(fault, Fault::with_hint)
+    })
 }
 
 /// Reads data of a kind from the bytes of a file; `file` is what messages call it, and `beside` reads files by paths relative
@@ -80,6 +118,7 @@ pub fn load(kind: &str, file: &str, bytes: &[u8], beside: &Beside) -> Result<Val
             depth::decode(bytes, scale, &limits).map(|d| Value::object(DepthValue::new(d))).map_err(text)
         }
         "armature" => armature::load(bytes, beside),
+        "keypoints" => return load_keypoints(file, bytes, None),
         "mesh" => {
             obj::load(bytes).map(|m| Value::object(SolidValue(Solid::new(Arc::new(m))))).map_err(|e| e.to_string())
         }

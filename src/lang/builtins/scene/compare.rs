@@ -14,8 +14,8 @@ use crate::vision::{
 use std::cell::RefCell;
 use std::sync::Arc;
 
-const SECTION: &str = "Comparing";
-const SEEN: Arg = arg("view", VIEW, "The view.");
+pub(super) const SECTION: &str = "Comparing";
+pub(super) const SEEN: Arg = arg("view", VIEW, "The view.");
 const SIZE: Arg =
     opt("size", Type::Int, "128", "The longer side of the picture that is drawn, 8 to 4096.").unit("pixels");
 
@@ -95,11 +95,11 @@ pub(super) const TABLE: &[Builtin] = &[
     ),
 ];
 
-fn likelihood(l: impl Likelihood + 'static) -> Result<Value, Fault> {
+pub(super) fn likelihood(l: impl Likelihood + 'static) -> Result<Value, Fault> {
     Ok(Value::Likelihood(Arc::new(l)))
 }
 
-fn view(a: &Args) -> Result<Arc<View>, Fault> {
+pub(super) fn view(a: &Args) -> Result<Arc<View>, Fault> {
     a.object::<ViewValue>(0, "a view").map(|v| Arc::clone(&v.0))
 }
 
@@ -152,7 +152,7 @@ fn image<'a>(observed: &'a Value, view: &View, what: &str) -> Result<&'a ImageVa
     Ok(image)
 }
 
-fn same_shape((w, h): (u32, u32), view: &View, what: &str) -> Result<(), String> {
+pub(super) fn same_shape((w, h): (u32, u32), view: &View, what: &str) -> Result<(), String> {
     let (cw, ch) = (view.camera().width, view.camera().height);
     let (a, b) = (f64::from(w) * f64::from(ch), f64::from(h) * f64::from(cw));
     if (a - b).abs() > 0.03 * a.max(b) {

@@ -5,13 +5,14 @@
 
 mod bodies;
 mod compare;
+mod compare_keypoints;
 mod objects;
 mod observed;
 mod seeing;
 mod shapes;
 
 pub use objects::{AffineValue, ArmatureValue, CameraValue, SolidValue, ViewValue};
-pub use observed::{DepthValue, ImageValue, MaskValue};
+pub use observed::{DepthValue, ImageValue, KeypointsValue, MaskValue};
 
 use super::{Arg, Args, Builtin, Kind, Type};
 use crate::geom::GeomError;
@@ -38,7 +39,8 @@ const fn native(
 
 /// All of them.
 pub(super) fn all() -> impl Iterator<Item = Builtin> {
-    [shapes::TABLE, bodies::TABLE, seeing::TABLE, compare::TABLE].into_iter().flatten().copied()
+    let tables = [shapes::TABLE, bodies::TABLE, seeing::TABLE, compare::TABLE, compare_keypoints::TABLE];
+    tables.into_iter().flatten().copied()
 }
 
 /// A shape that cannot be made: numbers outside their domain reject a proposal, anything else ends the run.

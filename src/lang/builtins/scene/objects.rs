@@ -27,7 +27,7 @@ impl Object for SolidValue {
             "size" => bounds().map(|b| Value::array(b.size().to_array())),
             "height" => bounds().map(|b| Value::Num(b.size().y)),
             "landmarks" => Some(Value::Record(Arc::new(
-                self.0.landmarks().iter().map(|l| (Arc::clone(&l.name), xyz(l.position.to_array()))).collect(),
+                self.0.landmarks().iter().map(|l| (Arc::clone(&l.name), Value::array(l.position.to_array()))).collect(),
             ))),
             _ => None,
         }

@@ -1,10 +1,10 @@
-//! What is observed: photographs and ready contour maps, masks, depth maps. What comparators prepare from them alone is made
+//! What is observed: photographs and ready contour maps, masks, depth maps, keypoints. What comparators prepare from them alone is made
 //! once, on first use, and kept beside them.
 
 use crate::lang::value::{Object, Value};
 use crate::vision::{
     Chamfer, ChamferOptions, ContourDetector, ContourMap, ContourRatio, ContourRatioOptions, DepthLikelihood, DepthMap,
-    GradientDetector, Mask, MaskLikelihood, Photo,
+    GradientDetector, Keypoints, Mask, MaskLikelihood, Photo,
 };
 use std::any::Any;
 use std::sync::{Arc, Mutex, OnceLock, PoisonError};
@@ -164,5 +164,27 @@ impl Object for DepthValue {
 
     fn as_any(&self) -> &dyn Any {
         self
+    }
+}
+
+/// The joints of a person that a detector found; none where there is no detection.
+#[derive(Clone, Debug, Default)]
+pub struct KeypointsValue(pub Keypoints);
+
+impl Object for KeypointsValue {
+    fn type_name(&self) -> &'static str {
+        "keypoints"
+    }
+
+    fn as_any(&self) -> &dyn Any {
+        self
+    }
+
+    fn field(&self, name: &str) -> Option<Value> {
+        (name == "count").then(|| Value::Num(self.0.points().len() as f64))
+    }
+
+    fn summary(&self) -> Option<String> {
+        Some(format!("{} joints", self.0.points().len()))
     }
 }

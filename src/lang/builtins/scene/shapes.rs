@@ -1,7 +1,7 @@
 //! Shapes and placements.
 
 use super::{AFFINE, AffineValue, SOLID, SolidValue, fault, native};
-use crate::geom::{Affine, Caps, Profile, Solid, cuboid, lathe, sphere};
+use crate::geom::{Affine, Caps, Landmark, Profile, Solid, cuboid, lathe, sphere};
 use crate::lang::builtins::{Args, Builtin, Type, arg, opt};
 use crate::lang::error::Fault;
 use crate::lang::value::Value;
@@ -82,6 +82,30 @@ pub(super) const TABLE: &[Builtin] = &[
         |a| {
             let s = a.object::<SolidValue>(0, "a solid")?;
             Ok(Value::object(SolidValue(s.0.centred(a.bool_or(1, false)?))))
+        },
+    ),
+    native(
+        "landmarks",
+        SECTION,
+        &[
+            arg("solid", SOLID, "A solid."),
+            arg("points", Type::Record, "Names and places, as in `{ tip: [0, 2, 0] }`.").unit("scene units"),
+        ],
+        SOLID,
+        "The solid with named points that go where it goes, in place of those it had; `solid.landmarks` reads them.",
+        |a| {
+            let s = a.object::<SolidValue>(0, "a solid")?;
+            let point = |(name, v): (&Arc<str>, &Value)| match v {
+                Value::Array(p) if p.len() == 3 && p.iter().all(|x| x.is_finite()) => {
+                    Ok(Landmark { name: Arc::clone(name), position: DVec3::new(p[0], p[1], p[2]) })
+                }
+                Value::Array(p) if p.len() == 3 => {
+                    Err(Fault::domain(format!("scene.landmarks: the point `{name}` must be finite")))
+                }
+                _ => Err(a.wrong(1, "a record of points [x, y, z]")),
+            };
+            let points = a.record(1)?.iter().map(point).collect::<Result<Vec<_>, _>>()?;
+            Ok(Value::object(SolidValue(s.0.clone().with_landmarks(points))))
         },
     ),
     native(

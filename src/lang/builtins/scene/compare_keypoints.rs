@@ -1,0 +1,83 @@
+//! The likelihood of detected joints given a view: its landmarks projected, compared with where a detector found them.
+//!
+//! A thin layer over [`crate::vision::keypoints`]: here landmarks become positions in pixels of the picture that the
+//! detections belong to.
+
+use super::compare::{SECTION, SEEN, likelihood, same_shape, view};
+use super::observed::KeypointsValue;
+use super::{ViewValue, native};
+use crate::diag::nearest;
+use crate::geom::Landmark;
+use crate::lang::builtins::{Builtin, Type, opt};
+use crate::lang::value::{Likelihood, Value};
+use crate::render::{Camera, View};
+use crate::vision::keypoints::{KeypointLikelihood, KeypointOptions, matching};
+use std::sync::Arc;
+
+pub(super) const TABLE: &[Builtin] = &[native(
+    "keypoints",
+    SECTION,
+    &[
+        SEEN,
+        opt("sd", Type::Num, "1.5", "The spread of a good detection along each axis.").unit("percent of the diagonal"),
+        opt("outlier", Type::Num, "0.05", "The share of detections of full confidence that are off."),
+    ],
+    Type::Likelihood,
+    "The density of detected joints: each near its landmark or anywhere in the picture; what was not found says nothing.",
+    |a| {
+        let options = KeypointOptions { sd: a.positive_or(1, 1.5)?, outlier: a.num_or(2, 0.05)? };
+        if !(options.outlier > 0.0 && options.outlier < 1.0) {
+            return Err(a.outside(2, "strictly between 0 and 1"));
+        }
+        likelihood(KeypointsOf { view: view(a)?, options })
+    },
+)];
+
+#[derive(Debug)]
+struct KeypointsOf {
+    view: Arc<View>,
+    options: KeypointOptions,
+}
+
+/// Where a landmark is in a picture of some size; none behind the camera.
+fn project(l: &Landmark, camera: &Camera, (width, height): (u32, u32)) -> Option<[f64; 2]> {
+    let (x, y, depth) = camera.project(l.position);
+    let (sx, sy) = (f64::from(width) / f64::from(camera.width), f64::from(height) / f64::from(camera.height));
+    (depth > Camera::NEAR && x.is_finite() && y.is_finite()).then_some([x * sx, y * sy])
+}
+
+impl ViewValue {
+    /// The landmarks of its solid, each with its place in a picture of this size (pixels): none of those behind the camera.
+    pub fn landmarks(&self, width: u32, height: u32) -> impl Iterator<Item = (&Arc<str>, Option<[f64; 2]>)> {
+        let camera = self.0.camera();
+        self.0.solid().landmarks().iter().map(move |l| (&l.name, project(l, camera, (width, height))))
+    }
+}
+
+impl Likelihood for KeypointsOf {
+    fn name(&self) -> &'static str {
+        "scene.keypoints"
+    }
+
+    fn log_density(&self, observed: &Value) -> Result<f64, String> {
+        let Some(KeypointsValue(seen)) = observed.downcast::<KeypointsValue>() else {
+            return Err(format!("scene.keypoints: the observed value must be keypoints, got {}", observed.type_name()));
+        };
+        if seen.is_empty() {
+            return Ok(0.0);
+        }
+        let (camera, landmarks) = (self.view.camera(), self.view.solid().landmarks());
+        let size = seen.size().unwrap_or((camera.width, camera.height));
+        same_shape(size, &self.view, self.name())?;
+        let names: Vec<&str> = landmarks.iter().map(|l| &*l.name).collect();
+        let near = |name: &str, known: &[&str]| nearest(name, known.iter().copied()).map(str::to_owned);
+        let found = matching(seen, &names, near).map_err(|e| format!("scene.keypoints: {e}"))?;
+        let model = KeypointLikelihood::new(f64::from(size.0), f64::from(size.1), &self.options)
+            .map_err(|e| format!("scene.keypoints: {e}"))?;
+        let terms = seen.points().iter().zip(found).filter_map(|(p, at)| {
+            let joint = project(landmarks.get(at?)?, camera, size);
+            Some(model.log_density(seen.position(p, size), p.confidence, joint))
+        });
+        Ok(terms.sum())
+    }
+}

@@ -1,0 +1,97 @@
+//! Means and variances of named points of the plane, one draw at a time and merged over chains.
+//!
+//! Invariant: the same draws in the same order give the same bits, and merging chains in order does not depend on when they
+//! ran.
+
+use indexmap::IndexMap;
+use std::sync::Arc;
+
+/// One point's draws so far.
+#[derive(Clone, Copy, Debug, Default, PartialEq)]
+pub struct Point {
+    /// The number of draws.
+    pub count: u64,
+    /// Their mean.
+    pub mean: [f64; 2],
+    /// Sums of squares about it.
+    squares: [f64; 2],
+}
+
+impl Point {
+    /// The square root of the mean of the two variances; 0 of a single draw.
+    pub fn sd(&self) -> f64 {
+        let [x, y] = self.squares;
+        (0.5 * (x + y) / self.count.saturating_sub(1).max(1) as f64).sqrt()
+    }
+
+    fn merge(&mut self, o: &Point) {
+        let (n, m) = (self.count as f64, o.count as f64);
+        let all = n + m;
+        if all == 0.0 {
+            return;
+        }
+        for i in 0..2 {
+            let d = o.mean[i] - self.mean[i];
+            self.mean[i] += d * (m / all);
+            self.squares[i] += o.squares[i] + d * d * (n * m / all);
+        }
+        self.count += o.count;
+    }
+}
+
+/// Points by name, in order of first appearance. A point need not be in every draw.
+#[derive(Clone, Debug, Default)]
+pub struct Moments(IndexMap<Arc<str>, Point>);
+
+impl Moments {
+    /// Takes a point of a draw (Welford 1962); one that is not finite is left out.
+    pub fn add(&mut self, name: &Arc<str>, at: [f64; 2]) {
+        if at.iter().all(|x| x.is_finite()) {
+            let one = Point { count: 1, mean: at, squares: [0.0; 2] };
+            self.0.entry(Arc::clone(name)).or_default().merge(&one);
+        }
+    }
+
+    /// Adds the draws of another chain (Chan, Golub & LeVeque 1979).
+    pub fn merge(&mut self, other: &Moments) {
+        for (name, p) in &other.0 {
+            self.0.entry(Arc::clone(name)).or_default().merge(p);
+        }
+    }
+
+    /// The points.
+    pub fn iter(&self) -> impl Iterator<Item = (&str, &Point)> {
+        self.0.iter().map(|(name, p)| (&**name, p))
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    #[test]
+    fn merged_chains_are_as_one_and_as_two_passes() {
+        let name: Arc<str> = Arc::from("a");
+        let draws: Vec<[f64; 2]> = (0..50).map(|i| [1e6 + f64::from(i * i % 17), f64::from(i % 5) - 2.0]).collect();
+        let of = |draws: &[[f64; 2]]| {
+            let mut m = Moments::default();
+            draws.iter().for_each(|d| m.add(&name, *d));
+            m
+        };
+        let mut merged = of(&draws[..13]);
+        merged.merge(&of(&draws[13..]));
+        merged.add(&name, [f64::NAN, 0.0]);
+        merged.merge(&Moments::default());
+        let n = draws.len() as f64;
+        let mean = [0, 1].map(|i| draws.iter().map(|d| d[i]).sum::<f64>() / n);
+        let variance =
+            [0, 1].map(|i| draws.iter().map(|d| (d[i] - mean[i]) * (d[i] - mean[i])).sum::<f64>() / (n - 1.0));
+        let sd = (0.5 * (variance[0] + variance[1])).sqrt();
+        for m in [of(&draws), merged] {
+            let (_, p) = m.iter().next().unwrap();
+            assert_eq!(p.count, 50);
+            assert!((0..2).all(|i| (p.mean[i] - mean[i]).abs() < 1e-8) && (p.sd() - sd).abs() < 1e-8, "{p:?}");
+        }
+        assert_eq!(of(&draws[..1]).iter().next().unwrap().1.sd(), 0.0);
+    }
+}

@@ -1,0 +1,208 @@
+//! How likely a detection is given where the model has the joint: it is near, or it is anywhere in the picture.
+//!
+//! Pure arithmetic on positions in pixels. A detection `z` of a joint at `p` has the density
+//! `(1 - e) N(z; p, s^2 I) + e / area` with `e = 1 - c (1 - outlier)` for a detector's confidence `c`: certain detections are
+//! off with the probability `outlier`, worthless ones tell nothing. Invariant: finite and never NaN, as `e > 0`.
+
+use crate::rng::Stream;
+use crate::vision::VisionError;
+
+/// The error model.
+#[derive(Clone, Debug, PartialEq)]
+pub struct KeypointOptions {
+    /// The standard deviation of a good detection along each axis, in percent of the image's diagonal; positive.
+    pub sd: f64,
+    /// The probability that a detection of full confidence is off; strictly between 0 and 1.
+    pub outlier: f64,
+}
+
+impl Default for KeypointOptions {
+    fn default() -> Self {
+        KeypointOptions { sd: 1.5, outlier: 0.05 }
+    }
+}
+
+/// The error model for one size of image. Positions are in its pixels, confidences in 0..=1 (others count as the nearest of
+/// those). Its density integrates to 1 as far as joints lie inside the image, which is where outliers are.
+#[derive(Clone, Debug)]
+pub struct KeypointLikelihood {
+    width: f64,
+    height: f64,
+    sd: f64,
+    outlier: f64,
+    log_peak: f64,
+    log_area: f64,
+}
+
+impl KeypointLikelihood {
+    /// The model for an image of this size in pixels.
+    ///
+    /// # Errors
+    /// If a side or an option is outside its range.
+    pub fn new(width: f64, height: f64, options: &KeypointOptions) -> Result<Self, VisionError> {
+        let positive = |name, value: f64| match value > 0.0 && value < 1e9 {
+            true => Ok(value),
+            false => Err(VisionError::Range { name, rule: "positive and less than 1e9", value }),
+        };
+        let (width, height) = (positive("width", width)?, positive("height", height)?);
+        let sd = positive("sd", options.sd)? / 100.0 * (width * width + height * height).sqrt();
+        // Whose square is still a number.
+        let sd = sd.max(1e-100);
+        let outlier = options.outlier;
+        if !(outlier > 0.0 && outlier < 1.0) {
+            return Err(VisionError::Range { name: "outlier", rule: "strictly between 0 and 1", value: outlier });
+        }
+        let log_peak = -libm::log(2.0 * std::f64::consts::PI * sd * sd);
+        Ok(KeypointLikelihood { width, height, sd, outlier, log_peak, log_area: libm::log(width * height) })
+    }
+
+    /// The standard deviation of a good detection along each axis, in pixels.
+    pub fn sd(&self) -> f64 {
+        self.sd
+    }
+
+    /// The probability that a detection of this confidence is off.
+    pub fn outlier(&self, confidence: f64) -> f64 {
+        1.0 - confidence.clamp(0.0, 1.0) * (1.0 - self.outlier)
+    }
+
+    /// The logs of the two parts of the density.
+    fn parts(&self, seen: [f64; 2], confidence: f64, joint: Option<[f64; 2]>) -> (f64, f64) {
+        let e = self.outlier(confidence);
+        let off = libm::log(e) - self.log_area;
+        let Some([x, y]) = joint.filter(|j| j.iter().all(|c| c.is_finite())) else { return (f64::NEG_INFINITY, off) };
+        let (dx, dy) = ((seen[0] - x) / self.sd, (seen[1] - y) / self.sd);
+        (libm::log1p(-e) + self.log_peak - 0.5 * (dx * dx + dy * dy), off)
+    }
+
+    /// The log density of a detection. `joint` is where the model has the joint; of one that it has nowhere (behind the
+    /// camera) every detection is off.
+    pub fn log_density(&self, seen: [f64; 2], confidence: f64, joint: Option<[f64; 2]>) -> f64 {
+        let (near, off) = self.parts(seen, confidence, joint);
+        let (high, low) = if near > off { (near, off) } else { (off, near) };
+        if low == f64::NEG_INFINITY { high } else { high + libm::log1p(libm::exp(low - high)) }
+    }
+
+    /// The derivative of the log density by the joint's position.
+    pub fn gradient(&self, seen: [f64; 2], confidence: f64, joint: [f64; 2]) -> [f64; 2] {
+        let (near, off) = self.parts(seen, confidence, Some(joint));
+        if near == f64::NEG_INFINITY {
+            return [0.0; 2];
+        }
+        let share = 1.0 / (1.0 + libm::exp(off - near));
+        [0, 1].map(|i| share * (seen[i] - joint[i]) / (self.sd * self.sd))
+    }
+
+    /// A detection drawn.
+    pub fn sample(&self, confidence: f64, joint: Option<[f64; 2]>, rng: &mut Stream) -> [f64; 2] {
+        match joint {
+            Some([x, y]) if rng.uniform() >= self.outlier(confidence) => {
+                [x + self.sd * rng.standard_normal(), y + self.sd * rng.standard_normal()]
+            }
+            _ => [self.width * rng.uniform(), self.height * rng.uniform()],
+        }
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+    use crate::rng::{Purpose, StreamKey};
+
+    fn model(sd: f64, outlier: f64) -> KeypointLikelihood {
+        KeypointLikelihood::new(400.0, 300.0, &KeypointOptions { sd, outlier }).unwrap()
+    }
+
+    #[test]
+    fn the_density_integrates_to_one() {
+        for (sd, outlier, confidence) in [(1.5, 0.05, 1.0), (1.0, 0.3, 0.4), (2.0, 0.05, 0.0)] {
+            let m = model(sd, outlier);
+            let mut sum = 0.0;
+            for j in 0..600 {
+                for i in 0..800 {
+                    let z = [0.5 * (f64::from(i) + 0.5), 0.5 * (f64::from(j) + 0.5)];
+                    sum += 0.25 * libm::exp(m.log_density(z, confidence, Some([180.3, 140.2])));
+                }
+            }
+            assert!((sum - 1.0).abs() < 1e-6, "{sum}");
+        }
+    }
+
+    #[test]
+    fn values_by_hand_and_limits() {
+        let m = model(1.0, 0.05);
+        assert_eq!(m.sd(), 5.0, "one percent of 500 pixels");
+        let at = |r: f64| m.log_density([100.0 + r, 100.0], 1.0, Some([100.0, 100.0]));
+        let density =
+            |r: f64| 0.95 * libm::exp(-r * r / 50.0) / (2.0 * std::f64::consts::PI * 25.0) + 0.05 / (400.0 * 300.0);
+        for r in [0.0, 1.0, 7.0, 20.0, 30.0] {
+            assert!((at(r) - libm::log(density(r))).abs() < 1e-12);
+        }
+        let off = libm::log(0.05 / 120_000.0);
+        assert_eq!(at(1e200), off);
+        for nowhere in [None, Some([f64::NAN, 0.0]), Some([0.0, f64::INFINITY])] {
+            assert!((m.log_density([1.0, 2.0], 1.0, nowhere) - off).abs() < 1e-12);
+        }
+        assert!((m.log_density([1.0, 1.0], 0.0, Some([1.0, 1.0])) + libm::log(120_000.0)).abs() < 1e-12);
+        assert_eq!(m.outlier(1.0), 0.050000000000000044, "{}", m.outlier(1.0));
+        assert!(model(1e-300, 1e-300).log_density([1.0, 1.0], 1.0, Some([2.0, 1.0])).is_finite());
+    }
+
+    #[test]
+    fn the_gradient_is_that_of_central_differences() {
+        let m = model(1.5, 0.1);
+        for joint in [[200.0, 150.0], [203.0, 148.5], [210.0, 170.0], [225.0, 150.0], [260.0, 150.0]] {
+            for confidence in [1.0, 0.5, 0.01, 0.0] {
+                let z = [200.0, 150.0];
+                let g = m.gradient(z, confidence, joint);
+                for axis in 0..2 {
+                    let shifted = |h: f64| {
+                        let mut p = joint;
+                        p[axis] += h;
+                        m.log_density(z, confidence, Some(p))
+                    };
+                    let slope = (shifted(1e-4) - shifted(-1e-4)) / 2e-4;
+                    assert!((g[axis] - slope).abs() < 1e-6, "{joint:?} {confidence} {g:?} {slope}");
+                }
+            }
+        }
+    }
+
+    #[test]
+    fn draws_have_the_stated_spread() {
+        let m = model(1.0, 0.2);
+        let mut rng = StreamKey::new(3, 0, Purpose::PREDICT).stream(0, 0, 0);
+        let n = 40_000;
+        let (mut near, mut square) = (0.0, 0.0);
+        for _ in 0..n {
+            let z = m.sample(0.5, Some([200.0, 150.0]), &mut rng);
+            let r2 = (z[0] - 200.0) * (z[0] - 200.0) + (z[1] - 150.0) * (z[1] - 150.0);
+            if r2 < 400.0 {
+                near += 1.0;
+                square += r2;
+            }
+        }
+        // Beyond 4 standard deviations lies exp(-8) of the normal part; within it a hundredth of the uniform one.
+        let expected = 0.4 * (1.0 - libm::exp(-8.0)) + 0.6 * std::f64::consts::PI * 400.0 / 120_000.0;
+        assert!((near / f64::from(n) - expected).abs() < 0.01, "{}", near / f64::from(n));
+        assert!((square / near - 50.0).abs() < 4.0, "{}", square / near);
+        let m = model(1.0, 0.2);
+        assert!((0..100).all(|_| m.sample(1.0, None, &mut rng)[1] < 300.0));
+    }
+
+    #[test]
+    fn options_are_checked() {
+        let of = |w: f64, sd: f64, outlier: f64| KeypointLikelihood::new(w, 10.0, &KeypointOptions { sd, outlier });
+        assert!(of(10.0, 1.0, 0.1).is_ok());
+        for (w, sd, outlier) in [
+            (0.0, 1.0, 0.1),
+            (f64::NAN, 1.0, 0.1),
+            (1.0, 0.0, 0.1),
+            (1.0, f64::INFINITY, 0.1),
+            (1.0, 1.0, 0.0),
+            (1.0, 1.0, 1.0),
+        ] {
+            assert!(of(w, sd, outlier).is_err());
+        }
+    }
+}

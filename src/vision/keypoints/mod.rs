@@ -1,0 +1,119 @@
+//! Keypoints: where a detector found the joints of a person, and how likely that is given where a model has them.
+//!
+//! Reads what pose detectors write, picks one person, and holds the error model; not a detector, and it knows nothing of
+//! bodies: a joint is a name. Invariant of [`Keypoints`]: names are unique, numbers finite, confidences in 0..=1.
+//!
+//! The layouts that [`People::parse`] reads, told apart by their shape; `null` for a person means that nobody was found, for
+//! a joint that it was not; the confidence is from 0 to 1 and may be left out:
+//!
+//! * one person: `{"nose": [x, y, confidence], …}`, or the same under `"keypoints"`;
+//! * many by id: `{"ID": {"keypoints": {"nose": [x, y, confidence], …}}, …}`;
+//! * COCO: `{"annotations": [{"keypoints": [x, y, v, …], "id": …, "image_id": …}], "images": …, "categories": …}` or the list
+//!   of results `[{"image_id": …, "keypoints": [x, y, v, …]}]`, with v = 0 for a joint that is missing and v above 1 counting
+//!   as 1;
+//! * MediaPipe: `{"pose_landmarks": [33 of {"x", "y", "visibility"}]}`, also called `"landmarks"`, also one such list per
+//!   person; x and y as shares of the image's width and height.
+//!
+//! Beside `"keypoints"`, and in COCO's `"images"`, `"width"` and `"height"` say which size of image the pixels are of.
+
+mod error;
+mod layouts;
+mod likelihood;
+mod matching;
+mod names;
+mod node;
+mod people;
+
+#[cfg(test)]
+mod calibration_tests;
+
+pub use error::KeypointsError;
+pub use likelihood::{KeypointLikelihood, KeypointOptions};
+pub use matching::matching;
+pub use names::{COCO, MEDIAPIPE};
+pub use people::{People, split_id};
+
+use std::sync::Arc;
+
+/// A joint that was detected.
+#[derive(Clone, Debug, PartialEq)]
+pub struct Keypoint {
+    /// Its name, as the well-known lists [`COCO`] and [`MEDIAPIPE`] write it if it is one of theirs.
+    pub name: Arc<str>,
+    /// From the left edge, in pixels; a share of the width if the set is normalised.
+    pub x: f64,
+    /// From the top edge, in pixels; a share of the height if the set is normalised.
+    pub y: f64,
+    /// The detector's confidence, 0 to 1; 1 if it gives none.
+    pub confidence: f64,
+}
+
+/// The joints detected of one person; none if nobody was.
+#[derive(Clone, Debug, Default, PartialEq)]
+pub struct Keypoints {
+    points: Vec<Keypoint>,
+    normalised: bool,
+    size: Option<(u32, u32)>,
+}
+
+impl Keypoints {
+    /// A set in pixels.
+    ///
+    /// # Errors
+    /// If a name occurs twice, a position is not finite or a confidence is not from 0 to 1.
+    pub fn new(points: Vec<Keypoint>) -> Result<Keypoints, KeypointsError> {
+        for (i, p) in points.iter().enumerate() {
+            if points[..i].iter().any(|q| q.name == p.name) {
+                return Err(KeypointsError::new(format!("the keypoint `{}` is there twice", p.name)));
+            }
+            if !(p.x.is_finite() && p.y.is_finite()) {
+                return Err(KeypointsError::new(format!("the position of the keypoint `{}` is not finite", p.name)));
+            }
+            if !(0.0..=1.0).contains(&p.confidence) {
+                let (name, c) = (&p.name, p.confidence);
+                return Err(KeypointsError::new(format!("the confidence of `{name}` must be from 0 to 1, got {c}")));
+            }
+        }
+        Ok(Keypoints { points, ..Keypoints::default() })
+    }
+
+    /// The same numbers as shares of the image's width and height.
+    fn into_normalised(self) -> Keypoints {
+        Keypoints { normalised: true, ..self }
+    }
+
+    /// The joints.
+    pub fn points(&self) -> &[Keypoint] {
+        &self.points
+    }
+
+    /// Whether there are none.
+    pub fn is_empty(&self) -> bool {
+        self.points.is_empty()
+    }
+
+    /// Whether positions are shares of the image's width and height, as MediaPipe writes them.
+    pub fn is_normalised(&self) -> bool {
+        self.normalised
+    }
+
+    /// Width and height in pixels of the image they were found in, if that is known.
+    pub fn size(&self) -> Option<(u32, u32)> {
+        self.size
+    }
+
+    /// The same, known to be of an image of this size; what a file says of its own size goes first.
+    #[must_use]
+    pub fn in_image(self, width: u32, height: u32) -> Keypoints {
+        let known = (width > 0 && height > 0).then_some((width, height));
+        Keypoints { size: self.size.or(known), ..self }
+    }
+
+    /// The position of a joint in pixels of an image of this size, where the set itself is in pixels of it or normalised.
+    pub fn position(&self, of: &Keypoint, (width, height): (u32, u32)) -> [f64; 2] {
+        match self.normalised {
+            true => [of.x * f64::from(width), of.y * f64::from(height)],
+            false => [of.x, of.y],
+        }
+    }
+}

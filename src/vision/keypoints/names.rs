@@ -1,0 +1,112 @@
+//! The joints that detectors name: COCO's 17 and MediaPipe's 33, with `l_` and `r_` for the person's own left and right.
+
+use std::borrow::Cow;
+
+/// COCO's joints in its order (Lin et al. 2014, "Microsoft COCO: Common Objects in Context").
+pub const COCO: [&str; 17] = [
+    "nose",
+    "l_eye",
+    "r_eye",
+    "l_ear",
+    "r_ear",
+    "l_shoulder",
+    "r_shoulder",
+    "l_elbow",
+    "r_elbow",
+    "l_wrist",
+    "r_wrist",
+    "l_hip",
+    "r_hip",
+    "l_knee",
+    "r_knee",
+    "l_ankle",
+    "r_ankle",
+];
+
+/// MediaPipe Pose's landmarks in its order (Bazarevsky et al. 2020, "BlazePose").
+pub const MEDIAPIPE: [&str; 33] = [
+    "nose",
+    "l_eye_inner",
+    "l_eye",
+    "l_eye_outer",
+    "r_eye_inner",
+    "r_eye",
+    "r_eye_outer",
+    "l_ear",
+    "r_ear",
+    "l_mouth",
+    "r_mouth",
+    "l_shoulder",
+    "r_shoulder",
+    "l_elbow",
+    "r_elbow",
+    "l_wrist",
+    "r_wrist",
+    "l_pinky",
+    "r_pinky",
+    "l_index",
+    "r_index",
+    "l_thumb",
+    "r_thumb",
+    "l_hip",
+    "r_hip",
+    "l_knee",
+    "r_knee",
+    "l_ankle",
+    "r_ankle",
+    "l_heel",
+    "r_heel",
+    "l_foot_index",
+    "r_foot_index",
+];
+
+/// Joints of other well-known lists that a rig may lack.
+const MORE: [&str; 2] = ["neck", "head_top"];
+
+/// The name as the lists here have it: `left_eye` and `LEFT_EYE` are `l_eye`, `mouth_left` is `l_mouth`. Other names are left
+/// as they are.
+pub(super) fn usual(name: &str) -> Cow<'_, str> {
+    let lower = name.to_ascii_lowercase();
+    let short = match (lower.strip_prefix("left_"), lower.strip_prefix("right_"), &*lower) {
+        (Some(rest), ..) => format!("l_{rest}"),
+        (_, Some(rest), _) => format!("r_{rest}"),
+        (.., "mouth_left") => "l_mouth".into(),
+        (.., "mouth_right") => "r_mouth".into(),
+        _ => lower,
+    };
+    if well_known(&short) { Cow::Owned(short) } else { Cow::Borrowed(name) }
+}
+
+fn well_known(name: &str) -> bool {
+    MEDIAPIPE.contains(&name) || MORE.contains(&name)
+}
+
+/// Whether a rig need not have this joint: the well-known ones except those of arms and legs.
+pub(super) fn may_lack(name: &str) -> bool {
+    let limb = ["shoulder", "elbow", "wrist", "hip", "knee", "ankle"];
+    well_known(name) && !name.get(2..).is_some_and(|rest| limb.contains(&rest))
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    #[test]
+    fn spellings_of_one_joint() {
+        for (name, expected) in [
+            ("left_eye", "l_eye"),
+            ("RIGHT_FOOT_INDEX", "r_foot_index"),
+            ("l_wrist", "l_wrist"),
+            ("mouth_right", "r_mouth"),
+            ("Nose", "nose"),
+            ("left_wing", "left_wing"),
+            ("Tail", "Tail"),
+        ] {
+            assert_eq!(usual(name), expected);
+        }
+        assert!(COCO.iter().all(|n| MEDIAPIPE.contains(n)));
+        let limbs: Vec<_> = COCO.into_iter().filter(|n| !may_lack(n)).collect();
+        assert_eq!(limbs, COCO[5..]);
+        assert!(may_lack("neck") && may_lack("l_heel") && !may_lack("tail") && !may_lack("é_hip"));
+    }
+}

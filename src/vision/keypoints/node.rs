@@ -1,0 +1,82 @@
+//! A place in a JSON document, so that what is wrong can be said with its path.
+
+use super::KeypointsError;
+use serde_json::Value;
+
+/// A value and where it stands.
+#[derive(Clone, Debug)]
+pub(super) struct Node<'a> {
+    pub value: &'a Value,
+    path: String,
+}
+
+impl<'a> Node<'a> {
+    pub fn root(value: &'a Value) -> Node<'a> {
+        Node { value, path: String::new() }
+    }
+
+    /// The field of an object; absent ones and fields of other things are none.
+    pub fn get(&self, field: &str) -> Option<Node<'a>> {
+        self.value.get(field).map(|value| self.field(field, value))
+    }
+
+    fn field(&self, field: &str, value: &'a Value) -> Node<'a> {
+        let dot = if self.path.is_empty() { "" } else { "." };
+        Node { value, path: format!("{}{dot}{field}", self.path) }
+    }
+
+    /// The fields of an object.
+    pub fn fields(&self) -> impl Iterator<Item = (&'a str, Node<'a>)> {
+        self.value.as_object().into_iter().flatten().map(|(k, v)| (k.as_str(), self.field(k, v)))
+    }
+
+    /// The elements of a list.
+    pub fn items(&self) -> impl Iterator<Item = Node<'a>> {
+        let path = &self.path;
+        let items = self.value.as_array().into_iter().flatten().enumerate();
+        items.map(move |(i, value)| Node { value, path: format!("{path}[{i}]") })
+    }
+
+    /// The number of elements of a list; 0 for anything else.
+    pub fn len(&self) -> usize {
+        self.value.as_array().map_or(0, Vec::len)
+    }
+
+    /// The error that this is not what was wanted.
+    pub fn wrong(&self, wanted: &str) -> KeypointsError {
+        let got = match self.value {
+            Value::Null => "null".to_owned(),
+            Value::Bool(b) => b.to_string(),
+            Value::Number(n) => n.to_string(),
+            Value::String(s) if s.chars().count() <= 40 => format!("{s:?}"),
+            Value::String(_) => "a string".to_owned(),
+            Value::Array(a) => format!("a list of {}", a.len()),
+            Value::Object(_) => "an object".to_owned(),
+        };
+        let place = if self.path.is_empty() { "the file".to_owned() } else { format!("`{}`", self.path) };
+        KeypointsError::new(format!("{place} must be {wanted}, got {got}"))
+    }
+
+    /// A finite number.
+    pub fn number(&self, wanted: &str) -> Result<f64, KeypointsError> {
+        self.value.as_f64().filter(|x| x.is_finite()).ok_or_else(|| self.wrong(wanted))
+    }
+
+    /// A string, or a number as it is written.
+    pub fn id(&self) -> Result<String, KeypointsError> {
+        match self.value {
+            Value::String(s) => Ok(s.clone()),
+            Value::Number(n) => Ok(n.to_string()),
+            _ => Err(self.wrong("a number or a string")),
+        }
+    }
+
+    /// `width` and `height` of an object that has both as positive whole numbers.
+    pub fn size(&self) -> Option<(u32, u32)> {
+        let side = |name: &str| {
+            let x = self.value.get(name)?.as_u64()?;
+            u32::try_from(x).ok().filter(|x| *x > 0)
+        };
+        Some((side("width")?, side("height")?))
+    }
+}

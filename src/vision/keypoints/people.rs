@@ -1,0 +1,111 @@
+//! Everybody a file tells of, and the choice of one of them.
+
+use super::error::first;
+use super::node::Node;
+use super::{Keypoints, KeypointsError, layouts};
+
+/// The people of a file, in its order.
+#[derive(Clone, Debug, Default)]
+pub struct People {
+    pub(super) all: Vec<Person>,
+}
+
+/// One of them.
+#[derive(Clone, Debug, Default)]
+pub(super) struct Person {
+    /// What tells them from the others; empty where the file has one person only.
+    pub id: String,
+    /// What they may share with others: the number and the file of the image.
+    pub image: Vec<String>,
+    pub keypoints: Keypoints,
+}
+
+/// A path without the `#ID` that picks a person out of the file, and that id.
+pub fn split_id(path: &str) -> (&str, Option<&str>) {
+    match path.rsplit_once('#') {
+        Some((file, id)) if !file.is_empty() && !id.is_empty() && !id.contains(['/', '\\']) => (file, Some(id)),
+        _ => (path, None),
+    }
+}
+
+impl People {
+    /// Reads a file; the layouts are those of the [module's head](super).
+    ///
+    /// # Errors
+    /// If it is not JSON or of no known layout, or has something wrong in it: a message with the path of it.
+    pub fn parse(bytes: &[u8]) -> Result<People, KeypointsError> {
+        let document = serde_json::from_slice(bytes).map_err(|e| KeypointsError::new(format!("not JSON: {e}")))?;
+        layouts::people(&Node::root(&document)).map(|all| People { all })
+    }
+
+    /// The number of people; somebody who was looked for and not found counts.
+    pub fn len(&self) -> usize {
+        self.all.len()
+    }
+
+    /// Whether the file tells of nobody.
+    pub fn is_empty(&self) -> bool {
+        self.all.is_empty()
+    }
+
+    /// What tells people apart, in the order of the file.
+    pub fn ids(&self) -> impl ExactSizeIterator<Item = &str> {
+        self.all.iter().map(|p| p.id.as_str())
+    }
+
+    /// One person: that of an id, or else that of a picture whose file is called `stem` (without folder and ending), or else
+    /// the only one there is. Of a file with nobody in it, no keypoints.
+    ///
+    /// # Errors
+    /// If there is nobody of that id, or nothing says which of several people is meant.
+    pub fn pick(&self, id: Option<&str>, stem: Option<&str>) -> Result<Keypoints, KeypointsError> {
+        if let Some(id) = id {
+            return match self.find(id)? {
+                Some(p) => Ok(p.keypoints.clone()),
+                None => Err(self.nobody(id)),
+            };
+        }
+        match (&self.all[..], stem) {
+            ([], _) => Ok(Keypoints::default()),
+            ([one], _) => Ok(one.keypoints.clone()),
+            (_, Some(stem)) => match self.find(stem)? {
+                Some(p) => Ok(p.keypoints.clone()),
+                None => Err(self.several(&format!("; none of them is `{stem}`, as the picture is"))),
+            },
+            _ => Err(self.several("")),
+        }
+    }
+
+    fn find(&self, id: &str) -> Result<Option<&Person>, KeypointsError> {
+        if let Some(p) = self.all.iter().find(|p| p.id == id) {
+            return Ok(Some(p));
+        }
+        // Files of pictures are often called by a number with zeros before it.
+        let number = id.trim_start_matches('0');
+        let same = |i: &String| i == id || i == number && id.bytes().all(|b| b.is_ascii_digit());
+        let found: Vec<&Person> = self.all.iter().filter(|p| p.image.iter().any(same)).collect();
+        match found[..] {
+            [] => Ok(None),
+            [one] => Ok(Some(one)),
+            _ => {
+                let ids = first(found.iter().map(|p| p.id.as_str()), 8);
+                let message = format!("there are {} people in the picture `{id}`: {ids}", found.len());
+                Err(KeypointsError::new(message).hint("add `#` and an id to the name of the file to choose one"))
+            }
+        }
+    }
+
+    fn nobody(&self, id: &str) -> KeypointsError {
+        let e = KeypointsError::new(format!("there is nobody with the id `{id}`"));
+        match self.all[..] {
+            [] => e.hint("there is nobody in the file at all"),
+            [Person { id: ref only, .. }] if only.is_empty() => e.hint("there is one person, without an id"),
+            _ => e.hint(format!("there are {}", first(self.ids(), 8))),
+        }
+    }
+
+    fn several(&self, more: &str) -> KeypointsError {
+        let message = format!("there are {} people in it: {}{more}", self.len(), first(self.ids(), 5));
+        KeypointsError::new(message).hint("add `#` and an id to the name of the file to choose one")
+    }
+}
