@@ -1,9 +1,10 @@
 //! From the command line to a program with its data.
 
-use super::args::{Given, Run};
+use super::args::{Given, Job};
 use super::{Failure, files, plain};
 use image::DynamicImage;
 use pcadlang::Program;
+use pcadlang::lang::builtins::data;
 use pcadlang::lang::builtins::scene::ImageValue;
 use pcadlang::lang::value::Value;
 use pcadlang::render::Camera;
@@ -30,9 +31,9 @@ pub fn program(given: &Given, quiet: bool) -> Result<Program, Failure> {
 }
 
 /// Binds the files of `--observe` and `--observe-contours`; gives the photograph among them.
-pub fn observe(mut program: Program, a: &Run) -> Result<(Program, Option<Photo>), Failure> {
+pub fn observe(mut program: Program, job: &Job) -> Result<(Program, Option<Photo>), Failure> {
     let mut image: Option<(String, Photo)> = None;
-    for spec in &a.observe {
+    for spec in &job.observe {
         let (name, path) = named(&program, spec)?;
         let kind = program.interface().data.iter().find(|d| d.name == name).and_then(|d| d.ty.clone());
         if kind.as_deref() == Some("image") {
@@ -40,10 +41,17 @@ pub fn observe(mut program: Program, a: &Run) -> Result<(Program, Option<Photo>)
             program = program.observe(&name, Value::object(ImageValue::photo(photo.clone())));
             image = Some((name, photo));
         } else {
-            program = program.observe_file(&name, &path)?;
+            program = match entry(&path) {
+                Some((file, id)) => {
+                    let bytes = part(file, id)?;
+                    let value = data::load(kind.as_deref().unwrap_or("json"), &path, &bytes);
+                    program.observe(&name, value.map_err(|e| Failure::Plain(e.message, e.hint))?)
+                }
+                None => program.observe_file(&name, &path)?,
+            };
         }
     }
-    if let Some(path) = &a.observe_contours {
+    if let Some(path) = &job.observe_contours {
         let map = ContourMap::from_image(&DynamicImage::from(decode(path)?.rgb().clone()).to_luma8());
         let name = match &image {
             Some((name, _)) => name.clone(),
@@ -53,6 +61,19 @@ pub fn observe(mut program: Program, a: &Run) -> Result<(Program, Option<Photo>)
         program = program.observe(&name, Value::object(ImageValue::contours(map, photo)));
     }
     Ok((program, image.map(|(_, p)| p)))
+}
+
+/// The file and entry of `FILE#ID`; a file that is called so is a file.
+fn entry(path: &str) -> Option<(&str, &str)> {
+    path.rsplit_once('#').filter(|(file, id)| !file.is_empty() && !id.is_empty() && !Path::new(path).exists())
+}
+
+/// One entry of a JSON object, as JSON.
+fn part(file: &str, id: &str) -> Result<Vec<u8>, Failure> {
+    let all: serde_json::Value =
+        serde_json::from_slice(&files::read(Path::new(file))?).map_err(|e| plain(format!("{file}: {e}")))?;
+    let found = all.get(id).ok_or_else(|| plain(format!("{file}: there is no entry {id:?}")))?;
+    Ok(found.to_string().into_bytes())
 }
 
 fn decode(path: &Path) -> Result<Photo, Failure> {

@@ -5,6 +5,7 @@
 
 pub mod csv;
 mod draws;
+pub mod evaluation;
 mod hash;
 pub mod html;
 pub mod npy;
@@ -14,9 +15,10 @@ mod rundir;
 mod sinks;
 pub mod table;
 mod warnings;
+mod whole;
 
 pub use draws::{ChainDraws, Quantity, quantities};
-pub use hash::text_hash;
+pub use hash::{bytes_hash, text_hash};
 pub use number::{number, seconds};
 pub use rundir::{RunDir, RunDirError};
 pub use sinks::{Memory, Tee};
