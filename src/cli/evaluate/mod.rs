@@ -146,7 +146,7 @@ impl<'a> Evaluation<'a> {
             let differences = resume::differences(&run, &t.record);
             if differences.is_empty() && !(self.a.fresh && t.chosen) {
                 t.row = Some(Row::of(&t.case.name, &run));
-            } else if !differences.is_empty() {
+            } else if !differences.is_empty() && run["state"] != "failed" {
                 other = other.or(Some((folder, differences)));
             }
         }
