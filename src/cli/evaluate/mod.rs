@@ -55,17 +55,12 @@ pub fn evaluate(a: &Evaluate) -> Result<(), Failure> {
             e.say(&format!("{place}: done before"));
             continue;
         }
-        match e.run(i) {
-            Ok(row) => {
-                e.say(&format!("{place}: {}", line(&row)));
-                e.tasks[i].row = Some(row);
-            }
-            Err((row, failure)) => {
-                e.say(&format!("{place}: failed"));
-                term::fail(failure);
-                failed.push(e.tasks[i].case.name.clone());
-                e.tasks[i].row = Some(row);
-            }
+        let (row, failure) = e.run(i);
+        e.say(&format!("{place}: {}", line(&row)));
+        e.tasks[i].row = Some(row);
+        if let Some(failure) = failure {
+            term::fail(failure);
+            failed.push(e.tasks[i].case.name.clone());
         }
         e.save()?;
         interrupted = e.progress.cancelled.load(Ordering::Relaxed);
@@ -87,6 +82,9 @@ pub fn evaluate(a: &Evaluate) -> Result<(), Failure> {
 
 /// A case in one line.
 fn line(row: &Row) -> String {
+    if row.status == "failed" {
+        return row.status.clone();
+    }
     let mut s = row.seconds.map_or(String::new(), seconds);
     if row.status != "done" {
         s = format!("{} after {s}", row.status);
@@ -180,22 +178,27 @@ impl<'a> Evaluation<'a> {
     }
 
     /// Runs a case; what there is to say of it is read off its folder, as for a case that was done before.
-    fn run(&self, i: usize) -> Result<Row, (Row, Failure)> {
+    fn run(&self, i: usize) -> (Row, Option<Failure>) {
         let t = &self.tasks[i];
         let begun = Instant::now();
         self.progress.steps.store(0, Ordering::Relaxed);
         self.progress.best.store(0, Ordering::Relaxed);
-        self.fill(t).map_err(|failure| {
-            let row = Row {
-                status: "failed".into(),
-                wall_seconds: Some(begun.elapsed().as_secs_f64()),
-                error: Some(failure.to_string()),
-                ..Row::pending(&t.case.name)
-            };
-            (row, failure)
-        })?;
-        let run = resume::left(&self.dir.file(&t.case.name)).unwrap_or_default();
-        Ok(Row::of(&t.case.name, &run))
+        match self.fill(t) {
+            Ok(()) => {
+                let run = resume::left(&self.dir.file(&t.case.name)).unwrap_or_default();
+                (Row::of(&t.case.name, &run), None)
+            }
+            // Its folder may be what failed.
+            Err(failure) => {
+                let row = Row {
+                    status: "failed".into(),
+                    wall_seconds: Some(begun.elapsed().as_secs_f64()),
+                    error: Some(failure.to_string()),
+                    ..Row::pending(&t.case.name)
+                };
+                (row, Some(failure))
+            }
+        }
     }
 
     fn fill(&self, t: &Task) -> Result<(), Failure> {
