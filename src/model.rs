@@ -141,6 +141,11 @@ impl Program {
         &self.text
     }
 
+    /// A hash of its text, that of the files it includes, and the parameters set so far: that of the model it gives.
+    pub fn hash(&self) -> String {
+        hash_of(&self.loaded, &self.sources, &self.sets)
+    }
+
     /// Names of built-in files that stood in for files of the user's own.
     pub fn embedded(&self) -> &[String] {
         &self.loaded.embedded

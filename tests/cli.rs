@@ -76,9 +76,10 @@ fn doc() {
 
 #[test]
 fn help() {
-    let all: [&[&str]; 7] = [
+    let all: [&[&str]; 8] = [
         &["--help"],
         &["run", "--help"],
+        &["evaluate", "--help"],
         &["sample", "--help"],
         &["check", "--help"],
         &["contours", "--help"],

@@ -18,6 +18,8 @@ pub struct Cli {
 pub enum Command {
     /// Sample the scenes that explain what is observed
     Run(Run),
+    /// Run a program on every picture of a dataset and write what scorers read
+    Evaluate(Evaluate),
     /// Draw scenes from the prior and show them on one sheet
     Sample(Sample),
     /// Check programs without running them
@@ -29,7 +31,7 @@ pub enum Command {
 }
 
 /// What a program is given.
-#[derive(Args, Debug)]
+#[derive(Args, Clone, Debug)]
 pub struct Given {
     /// The program: a file, or the name of a shipped one such as lathe.pcad
     #[arg(value_name = "PROG")]
@@ -42,22 +44,9 @@ pub struct Given {
     pub camera: Option<PathBuf>,
 }
 
-/// `run`.
-#[derive(Args, Debug)]
-pub struct Run {
-    /// Program, parameters, camera
-    #[command(flatten)]
-    pub given: Given,
-    /// A file for a `data` item; the name may be left out if there is only one that fits
-    #[arg(long, value_name = "[NAME=]FILE")]
-    pub observe: Vec<String>,
-    /// A ready contour map (bright is contour) in place of the photograph's own contours
-    #[arg(long, value_name = "FILE")]
-    pub observe_contours: Option<PathBuf>,
-    /// What a pose detector found: a file for the only `data` item of keypoints. `#ID` chooses one of several people; without it
-    /// the one called like the photograph's file
-    #[arg(long, value_name = "FILE[#ID]")]
-    pub keypoints: Option<String>,
+/// How a program is sampled.
+#[derive(Args, Clone, Debug)]
+pub struct Sampling {
     /// The seed: same seed, same draws
     #[arg(long, default_value_t = 1)]
     pub seed: u64,
@@ -73,15 +62,45 @@ pub struct Run {
     /// Kernel applications per chain in warm-up, in place of what the program says
     #[arg(long)]
     pub warmup: Option<u64>,
-    /// Time in all, such as 10s, 2m or 500ms; at most half of it is warm-up
+    /// Time in all (of a dataset: each case), such as 10s, 2m or 500ms; at most half of it is warm-up
     #[arg(long, value_parser = duration)]
     pub time: Option<Duration>,
-    /// The folder for results; runs/PROG if left out
-    #[arg(long, value_name = "DIR")]
-    pub out: Option<PathBuf>,
     /// Re-run the whole program at each step: slow, and the same draws; for checking the engine
     #[arg(long)]
     pub no_incremental: bool,
+}
+
+/// One run: a program, what it observes, how it is sampled.
+#[derive(Args, Clone, Debug)]
+pub struct Job {
+    /// Program, parameters, camera
+    #[command(flatten)]
+    pub given: Given,
+    /// A file for a `data` item, or FILE#ID for one entry of a JSON file; the name may be left out if there is only
+    /// one that fits
+    #[arg(long, value_name = "[NAME=]FILE")]
+    pub observe: Vec<String>,
+    /// A ready contour map (bright is contour) in place of the photograph's own contours
+    #[arg(long, value_name = "FILE")]
+    pub observe_contours: Option<PathBuf>,
+    /// What a pose detector found: a file for the only `data` item of keypoints. `#ID` chooses one of several people;
+    /// without it the one called like the photograph's file
+    #[arg(long, value_name = "FILE[#ID]")]
+    pub keypoints: Option<String>,
+    /// Seed, chains, steps, time
+    #[command(flatten)]
+    pub sampling: Sampling,
+}
+
+/// `run`.
+#[derive(Args, Debug)]
+pub struct Run {
+    /// What is run
+    #[command(flatten)]
+    pub job: Job,
+    /// The folder for results; runs/PROG if left out
+    #[arg(long, value_name = "DIR")]
+    pub out: Option<PathBuf>,
     /// Print the summary as JSON
     #[arg(long)]
     pub json: bool,
@@ -89,6 +108,49 @@ pub struct Run {
     #[arg(long)]
     pub quiet: bool,
 }
+
+/// `evaluate`.
+#[derive(Args, Debug)]
+#[command(after_help = LAYOUTS)]
+pub struct Evaluate {
+    /// Program, parameters, the camera of cases that have none of their own
+    #[command(flatten)]
+    pub given: Given,
+    /// The folder of the dataset
+    #[arg(value_name = "DATASET")]
+    pub dataset: PathBuf,
+    /// The folder for results: a run's folder for each case, and summaries
+    #[arg(long, value_name = "DIR")]
+    pub out: PathBuf,
+    /// Detected keypoints, JSON by case: each case observes its own; one without any runs on its picture alone
+    #[arg(long, value_name = "FILE")]
+    pub keypoints: Option<PathBuf>,
+    /// Only these cases
+    #[arg(long, value_name = "NAME,…", value_delimiter = ',')]
+    pub only: Vec<String>,
+    /// Seed, chains, steps, time
+    #[command(flatten)]
+    pub sampling: Sampling,
+    /// Do all cases anew; without it, those that are complete are kept, and other settings are an error
+    #[arg(long)]
+    pub fresh: bool,
+    /// Print the summary as JSON
+    #[arg(long)]
+    pub json: bool,
+    /// Print nothing but errors
+    #[arg(long)]
+    pub quiet: bool,
+}
+
+/// What a dataset may look like.
+const LAYOUTS: &str = "\
+The dataset is one of
+  * a folder for each case, with image.png (or .jpg) and, if its camera is known, camera.json
+  * a file annotations.json = {\"people\": [{\"id\": …, \"image\": FILE}, …]} with the pictures beside it
+Nothing else in it is read: neither other files nor other fields.
+
+DIR gets, besides a folder for each case, evaluation.json, table.md and, for people, predictions.json. Run again to go on
+after an interruption. Exit code 1 if a case failed, 3 if interrupted.";
 
 /// `sample`.
 #[derive(Args, Debug)]

@@ -1,6 +1,6 @@
 //! From the command line to a program with its data.
 
-use super::args::{Given, Run};
+use super::args::{Given, Job};
 use super::{Failure, files, plain};
 use image::DynamicImage;
 use pcadlang::Program;
@@ -31,11 +31,11 @@ pub fn program(given: &Given, quiet: bool) -> Result<Program, Failure> {
 }
 
 /// Binds the files of `--observe`, `--keypoints` and `--observe-contours`; gives the photograph among them.
-pub fn observe(mut program: Program, a: &Run) -> Result<(Program, Option<Photo>), Failure> {
+pub fn observe(mut program: Program, job: &Job) -> Result<(Program, Option<Photo>), Failure> {
     let mut image: Option<(String, Photo)> = None;
     let mut stem: Option<String> = None;
     let mut detected: Vec<(String, String)> = Vec::new();
-    for spec in &a.observe {
+    for spec in &job.observe {
         let (name, path) = named(&program, spec)?;
         let kind = program.interface().data.iter().find(|d| d.name == name).and_then(|d| d.ty.clone());
         match kind.as_deref() {
@@ -50,7 +50,7 @@ pub fn observe(mut program: Program, a: &Run) -> Result<(Program, Option<Photo>)
             _ => program = program.observe_file(&name, &path)?,
         }
     }
-    if let Some(path) = &a.keypoints {
+    if let Some(path) = &job.keypoints {
         detected.push((only(&program, "keypoints", "--keypoints")?, path.clone()));
     }
     for (name, path) in detected {
@@ -58,7 +58,7 @@ pub fn observe(mut program: Program, a: &Run) -> Result<(Program, Option<Photo>)
         let found = data::load_keypoints(&path, &bytes, stem.as_deref());
         program = program.observe(&name, found.map_err(|f| Failure::Plain(f.message, f.hint))?);
     }
-    if let Some(path) = &a.observe_contours {
+    if let Some(path) = &job.observe_contours {
         let map = ContourMap::from_image(&DynamicImage::from(decode(path)?.rgb().clone()).to_luma8());
         let name = match &image {
             Some((name, _)) => name.clone(),

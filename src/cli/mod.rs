@@ -1,11 +1,14 @@
 //! The commands. Only these modules print; everything they do is the library's.
 
 pub mod args;
+mod best;
 mod check;
 mod contours;
 mod doc;
+mod evaluate;
 mod files;
 mod given;
+mod job;
 mod keypoints;
 mod progress;
 mod run;
@@ -15,6 +18,7 @@ mod term;
 
 use args::{Cli, Command};
 use pcadlang::Error;
+use std::fmt;
 use std::process::ExitCode;
 use term::has_colors;
 
@@ -26,6 +30,17 @@ pub enum Failure {
     Plain(String, Option<String>),
     /// The user ended it; what there was is kept.
     Interrupted,
+}
+
+/// What went wrong, without colours and without a line end.
+impl fmt::Display for Failure {
+    fn fmt(&self, f: &mut fmt::Formatter<'_>) -> fmt::Result {
+        match self {
+            Failure::Program(e) => f.write_str(e.to_string().trim_end()),
+            Failure::Plain(message, _) => f.write_str(message),
+            Failure::Interrupted => f.write_str("interrupted"),
+        }
+    }
 }
 
 impl From<Error> for Failure {
@@ -43,6 +58,7 @@ fn plain(message: impl Into<String>) -> Failure {
 pub fn main(cli: Cli) -> ExitCode {
     let done = match cli.command {
         Command::Run(a) => run::run(&a),
+        Command::Evaluate(a) => evaluate::evaluate(&a),
         Command::Sample(a) => sample::sample(&a),
         Command::Check(a) => check::check(&a),
         Command::Contours(a) => contours::contours(&a),

@@ -5,6 +5,7 @@
 
 pub mod csv;
 mod draws;
+pub mod evaluation;
 mod hash;
 pub mod html;
 mod moments;
@@ -15,9 +16,10 @@ mod rundir;
 mod sinks;
 pub mod table;
 mod warnings;
+mod whole;
 
 pub use draws::{ChainDraws, Quantity, quantities};
-pub use hash::text_hash;
+pub use hash::{bytes_hash, text_hash};
 pub use moments::{Moments, Point};
 pub use number::{number, seconds};
 pub use rundir::{RunDir, RunDirError};

@@ -3,13 +3,14 @@
 //! Invariant: a file written through [`RunDir::write`] is whole or absent; draws are the only files that grow. The folder
 //! holds one run: what an earlier run left is removed before the next one starts.
 
-use std::io::{self, Write};
+use super::whole::{is_partial, write_whole};
+use std::io;
 use std::path::{Path, PathBuf};
 
 /// The file every run folder has.
 pub const MARK: &str = "run.json";
-/// The ending of files that are being written.
-const PARTIAL: &str = ".partial";
+/// What it holds while an earlier run is cleared away.
+const CLEARED: &[u8] = b"{}";
 /// What a run writes besides `run.json`, the draws `chain-N.csv`, and what its program exports.
 const WRITTEN: [&str; 12] = [
     "summary.json",
@@ -32,6 +33,9 @@ pub enum RunDirError {
     /// It holds something else.
     #[error("{0} is not empty and no folder of a run; choose another with --out")]
     Occupied(PathBuf),
+    /// It holds something, and no evaluation.
+    #[error("{0} is not empty and no folder of an evaluation; choose another with --out")]
+    NoEvaluation(PathBuf),
     /// It cannot be made or written.
     #[error("{path}: {error}")]
     Io {
@@ -64,6 +68,10 @@ impl RunDir {
         if !names.contains(&MARK) && names.iter().any(|n| !is_partial(n)) {
             return Err(RunDirError::Occupied(path.to_owned()));
         }
+        // Its mark must not stand for a whole run when this is stopped half way.
+        if names.contains(&MARK) {
+            write_whole(path, MARK, CLEARED).map_err(io)?;
+        }
         for name in names.into_iter().filter(|n| is_partial(n) || is_chain(n) || WRITTEN.contains(n)) {
             std::fs::remove_file(path.join(name)).map_err(io)?;
         }
@@ -95,23 +103,8 @@ impl RunDir {
     /// # Errors
     /// If it cannot be written; an older file of the name is kept then.
     pub fn write(&self, name: &str, bytes: &[u8]) -> Result<(), RunDirError> {
-        let (path, partial) = (self.file(name), self.file(&format!(".{name}{PARTIAL}")));
-        let io = |error| RunDirError::Io { path: path.clone(), error };
-        let mut written = std::fs::File::create(&partial).and_then(|mut f| f.write_all(bytes));
-        if written.is_ok() {
-            written = std::fs::rename(&partial, &path);
-        }
-        written.map_err(|e| {
-            // The error that is told is the first one.
-            let _ = std::fs::remove_file(&partial);
-            io(e)
-        })
+        write_whole(&self.path, name, bytes).map_err(|error| RunDirError::Io { path: self.file(name), error })
     }
-}
-
-/// Whether a file is half of one, as [`RunDir::write`] names them.
-fn is_partial(name: &str) -> bool {
-    name.starts_with('.') && name.ends_with(PARTIAL)
 }
 
 /// Whether a file holds the draws of a chain: `chain-N.csv`.

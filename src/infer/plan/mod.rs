@@ -36,11 +36,13 @@ pub struct RunOptions {
     pub incremental: bool,
     /// Bounds on what the program may build.
     pub limits: Limits,
+    /// Who looks at every draw.
+    pub watch: Option<Arc<dyn Watch>>,
 }
 
 impl Default for RunOptions {
     fn default() -> Self {
-        RunOptions { seed: 0, steps: None, warmup: None, time: None, incremental: true, limits: Limits::default() }
+        RunOptions { seed: 0, steps: None, warmup: None, time: None, incremental: true, limits: Limits::default(), watch: None }
     }
 }
 
@@ -54,8 +56,6 @@ pub trait Watch: fmt::Debug + Send + Sync {
 /// What is shared between the chains and whoever watches them.
 #[derive(Debug, Default)]
 pub struct Progress {
-    /// Who looks at every draw.
-    pub watch: Option<Box<dyn Watch>>,
     /// Set to end the run at the next step.
     pub cancelled: AtomicBool,
     /// Steps of all chains.
@@ -525,7 +525,7 @@ impl Runner<'_> {
             values: self.recorder.flatten(&values),
         };
         self.sink.draw(&row).map_err(ChainError::Sink)?;
-        if let Some(watch) = &self.progress.watch {
+        if let Some(watch) = &self.options.watch {
             watch.draw(self.chain, &mut self.trace, draws);
         }
         self.draws += 1;

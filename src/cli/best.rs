@@ -1,0 +1,166 @@
+//! The best draw of a run as files: its trace, depth, normals, mask, pictures, meshes, exports.
+//!
+//! Not the run (`job`), and not what is printed.
+
+use super::job::write;
+use super::{Failure, plain, scene};
+use image::GrayImage;
+use pcadlang::Model;
+use pcadlang::geom::{Mesh, Solid, glb, obj};
+use pcadlang::infer::ChainResult;
+use pcadlang::lang::builtins::scene::{SolidValue, ViewValue};
+use pcadlang::render::View;
+use pcadlang::report::pictures::{self, png};
+use pcadlang::report::{RunDir, npy};
+use pcadlang::trace::{Limits, Trace};
+use pcadlang::vision::Photo;
+use std::sync::Arc;
+
+/// What the page shows of the best draw.
+#[derive(Default)]
+pub struct Shown {
+    /// Captions and PNGs.
+    pub pictures: Vec<(&'static str, Vec<u8>)>,
+    /// The corners of the mesh.
+    pub positions: Vec<[f32; 3]>,
+    /// The mesh, if there is one.
+    pub mesh: Option<Mesh>,
+    /// What is seen.
+    pub view: Option<ViewValue>,
+}
+
+/// Rebuilds the draw with the highest log joint density, saves it, and draws it if it has a view.
+pub fn best_draw(
+    dir: &RunDir,
+    seed: u64,
+    model: &Model,
+    chains: &[ChainResult],
+    photo: Option<&Photo>,
+) -> Result<Shown, Failure> {
+    let best = chains.iter().filter_map(|c| c.best.as_ref()).max_by(|x, y| x.0.total_cmp(&y.0));
+    let Some((_, choices)) = best else { return Ok(Shown::default()) };
+    let draws = scene::predictive(seed, 0);
+    let built = Trace::generate(Arc::clone(model.code()), choices.iter().cloned(), draws, Limits::default());
+    let (mut trace, _) = built.map_err(|e| Failure::from(model.run_error(*e)))?;
+    let saved = serde_json::to_vec(&trace.save(model.hash())).unwrap_or_default();
+    write(dir, "best.trace.json", &saved)?;
+    let mut shown = Shown::default();
+    if let Some(view) = scene::view(&mut trace, draws, None) {
+        draw(dir, &view, chains, seed, photo, &mut shown)?;
+        shown.view = Some(ViewValue(view));
+    }
+    for x in model.exports() {
+        export(dir, model, &mut trace, x, seed)?;
+    }
+    Ok(shown)
+}
+
+/// Depth, normals, mask and meshes at the input's resolution; overlay, contours and mask frequency as pictures.
+fn draw(
+    dir: &RunDir,
+    view: &Arc<View>,
+    chains: &[ChainResult],
+    seed: u64,
+    photo: Option<&Photo>,
+    shown: &mut Shown,
+) -> Result<(), Failure> {
+    let camera = view.camera();
+    let (width, height) = photo.map_or((camera.width, camera.height), |p| (p.width(), p.height()));
+    let size = width.max(height);
+    let frame = view.frame(size);
+    let shape = [frame.height as usize, frame.width as usize];
+    write(dir, "depth.npy", &npy::f32_array(&shape, frame.depth.iter().copied()))?;
+    let normals = npy::f32_array(&[shape[0], shape[1], 3], frame.normal.iter().flatten().copied());
+    write(dir, "normals.npy", &normals)?;
+    let bytes = frame.mask().map(|m| if m { 255 } else { 0 }).collect();
+    let encode = |p: Result<Vec<u8>, image::ImageError>| p.map_err(|e| plain(e.to_string()));
+    if let Some(mask) = GrayImage::from_raw(frame.width, frame.height, bytes) {
+        write(dir, "mask.png", &encode(png(&mask))?)?;
+    }
+    let large = pictures::picture_size(width, height);
+    let (contours, picture) = (view.contours(size), view.frame(large.0.max(large.1)));
+    let (strokes, drawn) = (scene::strokes(&contours), scene::drawn(&picture));
+    let mut over = pictures::overlay(photo.map(Photo::rgb), &drawn, &strokes);
+    let marked = ViewValue(Arc::clone(view));
+    let joints: Vec<[f64; 2]> = marked.landmarks(width, height).filter_map(|(_, at)| at).collect();
+    pictures::dots(&mut over, (width, height), &joints);
+    let overlay = encode(png(&over))?;
+    let lines = encode(png(&pictures::contours(frame.width, frame.height, &strokes)))?;
+    write(dir, "overlay.png", &overlay)?;
+    write(dir, "contours.png", &lines)?;
+    if let Some(p) = photo {
+        let resized = image::imageops::resize(p.rgb(), large.0, large.1, image::imageops::FilterType::Triangle);
+        shown.pictures.push(("the photograph", encode(png(&resized))?));
+    }
+    shown.pictures.push(("the best draw over it", overlay));
+    let spread = encode(png(&frequency(chains, seed, 128)))?;
+    write(dir, "uncertainty.png", &spread)?;
+    shown.pictures.push(("how often the last draws of the chains cover a pixel", spread));
+    if let Some(mesh) = mesh(view.solid()) {
+        write(dir, "best.obj", obj::write(&mesh).as_bytes())?;
+        write(dir, "best.glb", &glb::write(&mesh))?;
+        let positions: Vec<[f32; 3]> = mesh.positions.iter().map(|p| p.to_array()).collect();
+        shown.positions = positions;
+        shown.mesh = Some(mesh);
+    }
+    Ok(())
+}
+
+/// The mesh of a solid; a solid too far away or too small for single precision has none, which is no reason to lose the run.
+fn mesh(solid: &Solid) -> Option<Mesh> {
+    match solid.to_mesh() {
+        Ok(mesh) => Some(mesh),
+        Err(e) => {
+            eprintln!("warning: no mesh is written: {e}");
+            None
+        }
+    }
+}
+
+/// How many of the chains' last states cover each pixel.
+fn frequency(chains: &[ChainResult], seed: u64, size: u32) -> GrayImage {
+    let mut counts: Vec<u32> = Vec::new();
+    let (mut width, mut height, mut of) = (1, 1, 0);
+    for c in chains {
+        let mut trace = c.last.clone();
+        let Some(view) = scene::view(&mut trace, scene::predictive(seed, 1), None) else { continue };
+        let frame = view.frame(size);
+        (width, height) = (frame.width, frame.height);
+        counts.resize((width * height) as usize, 0);
+        counts.iter_mut().zip(frame.mask()).for_each(|(n, m)| *n += u32::from(m));
+        of += 1;
+    }
+    pictures::frequency(width, height, &counts, of)
+}
+
+/// `export best(view) to "file.obj"`.
+fn export(
+    dir: &RunDir,
+    model: &Model,
+    trace: &mut Trace,
+    x: &pcadlang::lang::lower::Export,
+    seed: u64,
+) -> Result<(), Failure> {
+    use pcadlang::syntax::ast::ExprKind;
+    let expr = match &x.expr.kind {
+        ExprKind::Call { args, .. } if args.len() == 1 => &args[0].value,
+        _ => &x.expr,
+    };
+    let Some(operand) = model.code().queries.get(&expr.span).or_else(|| model.code().queries.get(&x.expr.span)) else {
+        return Ok(());
+    };
+    let values =
+        trace.query(&[*operand], scene::predictive(seed, 2)).map_err(|e| Failure::from(model.run_error(*e)))?;
+    let Some(value) = values.first() else { return Ok(()) };
+    let solid = value.downcast::<ViewValue>().map(|v| v.0.solid().clone());
+    let solid = solid.or_else(|| value.downcast::<SolidValue>().map(|s| s.0.clone()));
+    let name = x.file.trim_start_matches(['/', '.']);
+    match solid {
+        Some(solid) => {
+            let Some(mesh) = mesh(&solid) else { return Ok(()) };
+            let bytes = if name.ends_with(".glb") { glb::write(&mesh) } else { obj::write(&mesh).into_bytes() };
+            write(dir, &name.replace('/', "_"), &bytes)
+        }
+        None => write(dir, &name.replace('/', "_"), value.to_string().as_bytes()),
+    }
+}

@@ -1,0 +1,272 @@
+//! `pcadlang evaluate`: a program on every case of a dataset, and files that scorers read.
+//!
+//! Invariant: after every case all files are whole, and say what has been done so far; a case counts as done only if its
+//! `run.json` says so, with these settings.
+
+mod dataset;
+mod observed;
+mod resume;
+
+use super::args::{Evaluate, Given, Job};
+use super::{Failure, given, job, plain, term};
+use dataset::{Case, Dataset, Layout};
+use observed::{Detections, Items, observations_for};
+use pcadlang::infer::Progress;
+use pcadlang::report::evaluation::{EvaluationDir, MARK, PREDICTIONS, Row, TABLE, markdown, prediction};
+use pcadlang::report::{RunDir, bytes_hash, number, seconds};
+use serde_json::{Map, Value, json};
+use std::sync::Arc;
+use std::sync::atomic::Ordering;
+use std::time::Instant;
+
+/// A case on its way.
+struct Task {
+    case: Case,
+    job: Job,
+    record: Map<String, Value>,
+    /// Whether it is one of `--only`.
+    chosen: bool,
+    /// Nothing for a case that is neither chosen nor done.
+    row: Option<Row>,
+}
+
+/// The whole dataset on its way.
+struct Evaluation<'a> {
+    a: &'a Evaluate,
+    layout: Layout,
+    dir: EvaluationDir,
+    tasks: Vec<Task>,
+    /// What `evaluation.json` begins with.
+    head: Map<String, Value>,
+    progress: Arc<Progress>,
+}
+
+/// Runs a program over a dataset.
+pub fn evaluate(a: &Evaluate) -> Result<(), Failure> {
+    let mut e = Evaluation::prepare(a)?;
+    e.save()?;
+    job::end_on_interrupt(&e.progress);
+    let chosen: Vec<usize> = (0..e.tasks.len()).filter(|&i| e.tasks[i].chosen).collect();
+    let mut failed = Vec::new();
+    let mut interrupted = false;
+    for (n, &i) in chosen.iter().enumerate() {
+        let place = format!("{}/{} {}", n + 1, chosen.len(), e.tasks[i].case.name);
+        if e.tasks[i].row.as_ref().is_some_and(|r| r.status == "done") {
+            e.say(&format!("{place}: done before"));
+            continue;
+        }
+        let (row, failure) = e.run(i);
+        e.say(&format!("{place}: {}", line(&row)));
+        e.tasks[i].row = Some(row);
+        if let Some(failure) = failure {
+            term::fail(failure);
+            failed.push(e.tasks[i].case.name.clone());
+        }
+        e.save()?;
+        interrupted = e.progress.cancelled.load(Ordering::Relaxed);
+        if interrupted {
+            break;
+        }
+    }
+    if a.json {
+        println!("{}", e.summary());
+    } else if !a.quiet {
+        print!("{}", markdown(&e.rows()));
+    }
+    match failed.len() {
+        _ if interrupted => Err(Failure::Interrupted),
+        0 => Ok(()),
+        n => Err(plain(format!("{n} of {} cases failed: {}", chosen.len(), failed.join(", ")))),
+    }
+}
+
+/// A case in one line.
+fn line(row: &Row) -> String {
+    if row.status == "failed" {
+        return row.status.clone();
+    }
+    let mut s = row.seconds.map_or(String::new(), seconds);
+    if row.status != "done" {
+        s = format!("{} after {s}", row.status);
+    }
+    if let Some(best) = row.best_log_joint {
+        s.push_str(&format!(", best log joint {best:.1}"));
+    }
+    if let Some(r) = row.r_hat_max {
+        s.push_str(&format!(", R-hat {}", number((r * 1000.0).round() / 1000.0)));
+    }
+    s + &row.draws.map_or(String::new(), |n| format!(", {n} draws"))
+}
+
+impl<'a> Evaluation<'a> {
+    /// Everything that can be wrong with program, dataset or folder is said before the first case is run.
+    fn prepare(a: &'a Evaluate) -> Result<Evaluation<'a>, Failure> {
+        let Dataset { layout, cases, skipped } = Dataset::open(&a.dataset)?;
+        unknown_names(a, &cases)?;
+        let program = given::program(&a.given, a.quiet)?;
+        let hash = program.hash();
+        let detections = a.keypoints.clone().map(Detections::open).transpose()?;
+        let items = Items::of(&program, detections.is_some())?;
+        program.without_data().compile()?;
+        let dir = EvaluationDir::open(&a.out).map_err(|e| plain(e.to_string()))?;
+        let task = |case: Case| {
+            let camera = case.camera.clone().or_else(|| a.given.camera.clone());
+            let case = Case { camera: camera.clone(), ..case };
+            let observe = observations_for(&case, detections.as_ref()).iter().map(|o| items.spec(o)).collect();
+            let given = Given { camera, ..a.given.clone() };
+            let job = Job { given, observe, observe_contours: None, keypoints: None, sampling: a.sampling.clone() };
+            let mut record = job::record(&job, &hash);
+            let inputs = bytes_hash(&observed::bytes(&case, detections.as_ref()));
+            record.insert("inputs_hash".into(), json!(inputs));
+            let chosen = a.only.is_empty() || a.only.contains(&case.name);
+            Task { case, job, record, chosen, row: None }
+        };
+        let tasks = cases.into_iter().map(task).collect();
+        let mut e = Evaluation { a, layout, dir, tasks, head: Map::new(), progress: Arc::new(Progress::default()) };
+        e.take_up()?;
+        e.head = e.head();
+        for name in skipped {
+            e.say(&format!("note: {name} has no image and is left out"));
+        }
+        for t in e.tasks.iter().filter(|t| detections.is_some() && t.chosen && t.job.observe.len() < 2) {
+            e.say(&format!("note: nobody was detected in {}: it runs on its picture alone", t.case.name));
+        }
+        Ok(e)
+    }
+
+    /// Rows of what an earlier evaluation did; one with other settings is an error.
+    fn take_up(&mut self) -> Result<(), Failure> {
+        let mut other = None;
+        for t in &mut self.tasks {
+            t.row = t.chosen.then(|| Row::pending(&t.case.name));
+            let folder = self.dir.file(&t.case.name);
+            let Some(run) = resume::left(&folder) else { continue };
+            let differences = resume::differences(&run, &t.record);
+            if differences.is_empty() && !(self.a.fresh && t.chosen) {
+                t.row = Some(Row::of(&t.case.name, &run));
+            } else if !differences.is_empty() && run["state"] != "failed" {
+                other = other.or(Some((folder, differences)));
+            }
+        }
+        match other {
+            Some((folder, differences)) if !self.a.fresh => Err(Failure::Plain(
+                format!("{} was run with other settings: {}", folder.display(), differences.join(", ")),
+                Some("choose another folder with --out, or do all cases anew with --fresh".into()),
+            )),
+            _ => Ok(()),
+        }
+    }
+
+    /// What all cases have in common.
+    fn head(&self) -> Map<String, Value> {
+        let a = self.a;
+        let mut head: Map<String, Value> = Map::new();
+        let Some(first) = self.tasks.first() else { return head };
+        for key in ["version", "program", "program_hash", "seed", "set", "settings"] {
+            head.insert(key.into(), first.record.get(key).cloned().unwrap_or_default());
+        }
+        let layout = if self.layout == Layout::People { "people" } else { "folders" };
+        let more = [
+            ("threads", json!(job::threads(&first.job))),
+            ("machine_threads", json!(job::machine_threads())),
+            ("dataset", json!(a.dataset)),
+            ("layout", json!(layout)),
+            ("keypoints", json!(a.keypoints)),
+        ];
+        head.extend(more.map(|(k, v)| (k.to_owned(), v)));
+        head
+    }
+
+    /// Runs a case; what there is to say of it is read off its folder, as for a case that was done before.
+    fn run(&self, i: usize) -> (Row, Option<Failure>) {
+        let t = &self.tasks[i];
+        let begun = Instant::now();
+        self.progress.steps.store(0, Ordering::Relaxed);
+        self.progress.best.store(0, Ordering::Relaxed);
+        match self.fill(t) {
+            Ok(()) => {
+                let run = resume::left(&self.dir.file(&t.case.name)).unwrap_or_default();
+                (Row::of(&t.case.name, &run), None)
+            }
+            // Its folder may be what failed.
+            Err(failure) => {
+                let row = Row {
+                    status: "failed".into(),
+                    wall_seconds: Some(begun.elapsed().as_secs_f64()),
+                    error: Some(failure.to_string()),
+                    ..Row::pending(&t.case.name)
+                };
+                (row, Some(failure))
+            }
+        }
+    }
+
+    fn fill(&self, t: &Task) -> Result<(), Failure> {
+        let dir = RunDir::create(&self.dir.file(&t.case.name)).map_err(|e| plain(e.to_string()))?;
+        let begun = Instant::now();
+        let ready = job::prepare(&t.job, true).inspect_err(|failure| {
+            // The error that is told is the first one.
+            let _ = job::record_failure(&dir, &t.record, failure, begun.elapsed().as_secs_f64());
+        })?;
+        let live = !(self.a.quiet || self.a.json);
+        job::perform(&t.job, &ready, &dir, &t.record, &self.progress, live).map(|_| ())
+    }
+
+    fn rows(&self) -> Vec<Row> {
+        self.tasks.iter().filter_map(|t| t.row.clone()).collect()
+    }
+
+    fn summary(&self) -> Value {
+        let mut all = self.head.clone();
+        all.insert("cases".into(), json!(self.rows()));
+        Value::Object(all)
+    }
+
+    /// Writes what is known so far.
+    fn save(&self) -> Result<(), Failure> {
+        let write = |name: &str, bytes: &[u8]| self.dir.write(name, bytes).map_err(|e| plain(e.to_string()));
+        let json = |v: &Value| serde_json::to_vec_pretty(v).unwrap_or_default();
+        // This one first: it marks the folder.
+        write(MARK, &json(&self.summary()))?;
+        write(TABLE, markdown(&self.rows()).as_bytes())?;
+        if self.layout == Layout::People {
+            write(PREDICTIONS, &json(&Value::Object(self.predictions())))?;
+        }
+        Ok(())
+    }
+
+    /// Where each person's joints were found: null where a run failed or its scene has none.
+    fn predictions(&self) -> Map<String, Value> {
+        let ended =
+            self.tasks.iter().filter_map(|t| t.row.as_ref()).filter(|r| ["done", "failed"].contains(&&*r.status));
+        let entry = |row: &Row| {
+            let file = self.dir.file(&row.case).join("keypoints.json");
+            let found = std::fs::read(file).ok().and_then(|b| serde_json::from_slice::<Value>(&b).ok());
+            let found = found.filter(|_| row.status == "done");
+            (row.case.clone(), prediction(found.as_ref(), row.seconds.or(row.wall_seconds)))
+        };
+        ended.map(entry).collect()
+    }
+
+    /// Progress, for people.
+    fn say(&self, text: &str) {
+        if !self.a.quiet {
+            eprintln!("{text}");
+        }
+    }
+}
+
+/// Names of `--only` that are no case.
+fn unknown_names(a: &Evaluate, cases: &[Case]) -> Result<(), Failure> {
+    let names: Vec<&str> = cases.iter().map(|c| c.name.as_str()).collect();
+    match a.only.iter().find(|n| !names.contains(&n.as_str())) {
+        None => Ok(()),
+        Some(n) => {
+            let hint = match pcadlang::diag::nearest(n, names.iter().copied()) {
+                Some(near) => format!("did you mean `{near}`?"),
+                None => format!("there are {}", names.join(", ")),
+            };
+            Err(Failure::Plain(format!("{}: there is no case {n:?}", a.dataset.display()), Some(hint)))
+        }
+    }
+}

@@ -1,0 +1,79 @@
+//! Whether what an earlier evaluation left is of the same settings.
+
+use serde_json::{Map, Value};
+use std::path::Path;
+
+/// What must be the same for draws to be the same, and how it is called.
+const KEYS: [(&str, &str); 6] = [
+    ("version", "version"),
+    ("program_hash", "program"),
+    ("inputs_hash", "picture, camera or keypoints"),
+    ("seed", "seed"),
+    ("set", "--set"),
+    ("settings", ""),
+];
+
+/// The `run.json` of a folder, if a run was begun there.
+pub fn left(folder: &Path) -> Option<Value> {
+    let bytes = std::fs::read(folder.join("run.json")).ok()?;
+    let run: Value = serde_json::from_slice(&bytes).unwrap_or_default();
+    // Without a program, it was cleared away for the next one.
+    run.get("program_hash").is_some().then_some(run)
+}
+
+/// What is another there than in the record of a run; empty if its draws are the same.
+pub fn differences(there: &Value, record: &Map<String, Value>) -> Vec<String> {
+    let mut all = Vec::new();
+    for (key, called) in KEYS {
+        let now = record.get(key).unwrap_or(&Value::Null);
+        match now {
+            Value::Object(settings) if key == "settings" => {
+                let changed = settings.iter().filter(|(k, now)| there[key][k] != **now);
+                all.extend(changed.map(|(k, now)| said(k, &there[key][k], now)));
+            }
+            // Hashes say nothing to people.
+            now if there[key] != *now && key.ends_with("hash") => all.push(called.to_owned()),
+            now if there[key] != *now => all.push(said(called, &there[key], now)),
+            _ => {}
+        }
+    }
+    all
+}
+
+fn said(what: &str, there: &Value, now: &Value) -> String {
+    let text = |v: &Value| match v {
+        Value::Null => "none".to_owned(),
+        Value::String(s) => s.clone(),
+        Value::Object(m) if m.is_empty() => "none".to_owned(),
+        v => v.to_string(),
+    };
+    format!("{what} ({} there, {} now)", text(there), text(now))
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+    use serde_json::json;
+
+    #[test]
+    fn differences_are_named() {
+        let record = json!({
+            "version": "1", "program_hash": "a", "inputs_hash": "b", "seed": 1, "set": { "x": "2", "y": "3" },
+            "settings": { "chains": 4, "time": null }, "observe": ["a"],
+        });
+        let Value::Object(record) = record else { panic!() };
+        let mut there = Value::Object(record.clone());
+        there["observe"] = json!(["elsewhere"]);
+        there["state"] = json!("done");
+        there["set"] = json!({ "y": "3", "x": "2" });
+        assert_eq!(differences(&there, &record), [""; 0]);
+        there["seed"] = json!(2);
+        there["settings"]["time"] = json!(3.5);
+        there["program_hash"] = json!("c");
+        there["set"] = json!({});
+        let expected = ["program", "seed (2 there, 1 now)", r#"--set (none there, {"x":"2","y":"3"} now)"#];
+        assert_eq!(differences(&there, &record)[..3], expected);
+        assert_eq!(differences(&there, &record)[3..], ["time (3.5 there, none now)"]);
+        assert_eq!(differences(&json!([]), &record).len(), 6);
+    }
+}

@@ -1,0 +1,25 @@
+//! Files that no reader ever sees half of: written under another name, then renamed.
+
+use std::io::{self, Write};
+use std::path::Path;
+
+/// The ending of files that are being written.
+const PARTIAL: &str = ".partial";
+
+/// Writes a file of a folder; an older one of the name is kept if that fails.
+pub(super) fn write_whole(folder: &Path, name: &str, bytes: &[u8]) -> io::Result<()> {
+    let (path, partial) = (folder.join(name), folder.join(format!(".{name}{PARTIAL}")));
+    let mut written = std::fs::File::create(&partial).and_then(|mut f| f.write_all(bytes));
+    if written.is_ok() {
+        written = std::fs::rename(&partial, &path);
+    }
+    written.inspect_err(|_| {
+        // The error that is told is the first one.
+        let _ = std::fs::remove_file(&partial);
+    })
+}
+
+/// Whether a file is half of one, as [`write_whole`] names them.
+pub(super) fn is_partial(name: &str) -> bool {
+    name.starts_with('.') && name.ends_with(PARTIAL)
+}
