@@ -24,7 +24,9 @@ pub(super) struct Run {
 /// library: NaN gives 0.
 #[inline]
 fn first_centre(at: f64, side: u32) -> u32 {
-    let at = (at - 0.5).max(0.0).min(f64::from(side));
+    let (at, side) = (at - 0.5, f64::from(side));
+    let at = if at > 0.0 { at } else { 0.0 };
+    let at = if at < side { at } else { side };
     let whole = at as u32;
     whole + u32::from(f64::from(whole) < at)
 }
@@ -252,7 +254,10 @@ fn fill(triangle: &Triangle, camera: &Camera, area: &Area, buffer: &mut [f32]) {
         let (start, skipped) = ((run.row - area.top) * columns, from - run.from);
         let Some(pixels) = buffer.get_mut(start + from - area.left..start + to - area.left) else { return };
         for (i, pixel) in pixels.iter_mut().enumerate() {
-            let q = (run.nearness + run.step * (i + skipped) as f32).max(lo).min(hi);
+            // Comparisons that NaN fails are one instruction each, which `max` and `min` are not.
+            let q = run.nearness + run.step * (i + skipped) as f32;
+            let q = if q > lo { q } else { lo };
+            let q = if q < hi { q } else { hi };
             *pixel = if q > *pixel { q } else { *pixel };
         }
     });
