@@ -4,7 +4,7 @@ use super::*;
 use crate::geom::Affine;
 use crate::render::testing::{Uniform, cuboid, lathe, sphere};
 use crate::render::{Channels, Frame, Projection};
-use glam::Vec3;
+use glam::{DVec3, Vec3};
 
 fn place(at: [f64; 3], turn: [f64; 3], scale: f64) -> Affine {
     Affine::new(DVec3::from_array(at), DVec3::from_array(turn), DVec3::splat(scale))

@@ -7,9 +7,11 @@ mod camera;
 mod camera_json;
 mod contours;
 mod frame;
+mod layers;
 mod project;
 mod raster;
 mod shade;
+mod trace;
 mod view;
 mod visibility;
 

@@ -4,7 +4,7 @@
 //! and -depth for a parallel projection: linear over the image inside a triangle, larger is nearer in both.
 
 use super::{Camera, Projection};
-use crate::geom::{Affine, Solid};
+use crate::geom::{Affine, Mesh, Solid};
 use glam::{DMat3, DVec3};
 
 /// Coordinates beyond this (scene units) mark a vertex as unusable.
@@ -122,33 +122,51 @@ pub(super) struct DepthRange {
     pub far: f64,
 }
 
+impl Default for DepthRange {
+    fn default() -> DepthRange {
+        DepthRange::EMPTY
+    }
+}
+
 impl DepthRange {
+    /// Of no vertices.
+    pub const EMPTY: DepthRange = DepthRange { near: f64::INFINITY, far: f64::NEG_INFINITY };
+
     /// The extent, 0 when nothing is in front of the camera.
     pub fn extent(&self) -> f64 {
         (self.far - self.near).max(0.0)
+    }
+
+    /// Of these vertices and others.
+    pub fn and(&self, other: &DepthRange) -> DepthRange {
+        DepthRange { near: self.near.min(other.near), far: self.far.max(other.far) }
     }
 }
 
 /// Projects every vertex of a solid, instance after instance, into `out` (cleared first).
 pub(super) fn project(solid: &Solid, camera: &Camera, out: &mut Vec<Point>) -> DepthRange {
     out.clear();
-    let lens = Lens::new(camera);
-    let mut range = DepthRange { near: f64::INFINITY, far: f64::NEG_INFINITY };
-    for instance in solid.instances() {
+    solid.instances().iter().fold(DepthRange::EMPTY, |range, instance| {
         let placement = Placement::new(camera, &instance.affine);
-        out.extend(instance.mesh.positions.iter().map(|p| {
-            let p = placement.point(p.as_dvec3());
-            // Written so that NaN fails it.
-            if !(p.x.abs() < HUGE && p.y.abs() < HUGE && p.z.abs() < HUGE) {
-                return Point { x: 0.0, y: 0.0, nearness: 0.0, depth: f64::NAN };
-            }
-            if -p.z < Camera::NEAR {
-                return Point { x: 0.0, y: 0.0, nearness: 0.0, depth: -p.z };
-            }
-            range.near = range.near.min(-p.z);
-            range.far = range.far.max(-p.z);
-            lens.point(p)
-        }));
-    }
+        range.and(&project_mesh(&instance.mesh, &placement, &Lens::new(camera), out))
+    })
+}
+
+/// Projects the vertices of one mesh to the end of `out`.
+pub(super) fn project_mesh(mesh: &Mesh, placement: &Placement, lens: &Lens, out: &mut Vec<Point>) -> DepthRange {
+    let mut range = DepthRange::EMPTY;
+    out.extend(mesh.positions.iter().map(|p| {
+        let p = placement.point(p.as_dvec3());
+        // Written so that NaN fails it.
+        if !(p.x.abs() < HUGE && p.y.abs() < HUGE && p.z.abs() < HUGE) {
+            return Point { x: 0.0, y: 0.0, nearness: 0.0, depth: f64::NAN };
+        }
+        if -p.z < Camera::NEAR {
+            return Point { x: 0.0, y: 0.0, nearness: 0.0, depth: -p.z };
+        }
+        range.near = range.near.min(-p.z);
+        range.far = range.far.max(-p.z);
+        lens.point(p)
+    }));
     range
 }

@@ -6,7 +6,7 @@
 
 use super::project::{Lens, Placement, Point, project};
 use super::{Camera, project::DepthRange};
-use crate::geom::Solid;
+use crate::geom::{Mesh, Solid};
 use glam::DVec3;
 
 /// A run of pixels in one row; nearness changes linearly from pixel to pixel.
@@ -24,7 +24,9 @@ pub(super) struct Run {
 /// library: NaN gives 0.
 #[inline]
 fn first_centre(at: f64, side: u32) -> u32 {
-    let at = (at - 0.5).max(0.0).min(f64::from(side));
+    let (at, side) = (at - 0.5, f64::from(side));
+    let at = if at > 0.0 { at } else { 0.0 };
+    let at = if at < side { at } else { side };
     let whole = at as u32;
     whole + u32::from(f64::from(whole) < at)
 }
@@ -119,43 +121,56 @@ pub(super) fn each_triangle(
     points: &[Point],
     mut draw: impl FnMut(&Triangle, &Source<'_>),
 ) {
-    let (width, height) = (camera.width, camera.height);
     let mut base = 0;
     for (instance, item) in solid.instances().iter().enumerate() {
-        let placement = Placement::new(camera, &item.affine);
+        let placement = &Placement::new(camera, &item.affine);
         let count = item.mesh.positions.len();
         let Some(points) = points.get(base..base + count) else { return };
         base += count;
-        // With the eye outside, the faces of a body that are turned away are hidden by others.
-        let fronts_only = item.mesh.topology.encloses && points.iter().all(|p| p.depth >= Camera::NEAR);
-        for (face, &[i, j, k]) in item.mesh.topology.triangles.iter().enumerate() {
-            let (Some(a), Some(b), Some(c)) = (points.get(i as usize), points.get(j as usize), points.get(k as usize))
-            else {
-                continue;
-            };
-            if fronts_only && turned_away(a, b, c, placement.mirrored) {
+        mesh_triangles(&item.mesh, placement, camera, points, |triangle, face, weights| {
+            draw(triangle, &Source { instance, face, placement, weights });
+        });
+    }
+}
+
+/// As [`each_triangle`] for one mesh: `draw` gets the face and the weights of [`Source`].
+fn mesh_triangles(
+    mesh: &Mesh,
+    placement: &Placement,
+    camera: &Camera,
+    points: &[Point],
+    mut draw: impl FnMut(&Triangle, usize, [[f64; 3]; 3]),
+) {
+    let (width, height) = (camera.width, camera.height);
+    // With the eye outside, the faces of a body that are turned away are hidden by others.
+    let fronts_only = mesh.topology.encloses && points.iter().all(|p| p.depth >= Camera::NEAR);
+    for (face, &[i, j, k]) in mesh.topology.triangles.iter().enumerate() {
+        let (Some(a), Some(b), Some(c)) = (points.get(i as usize), points.get(j as usize), points.get(k as usize))
+        else {
+            continue;
+        };
+        if fronts_only && turned_away(a, b, c, placement.mirrored) {
+            continue;
+        }
+        if a.depth >= Camera::NEAR && b.depth >= Camera::NEAR && c.depth >= Camera::NEAR {
+            if let Some(triangle) = Triangle::new([*a, *b, *c], width, height) {
+                draw(&triangle, face, WHOLE);
+            }
+        } else if a.depth >= Camera::NEAR || b.depth >= Camera::NEAR || c.depth >= Camera::NEAR {
+            if a.depth.is_nan() || b.depth.is_nan() || c.depth.is_nan() {
                 continue;
             }
-            if a.depth >= Camera::NEAR && b.depth >= Camera::NEAR && c.depth >= Camera::NEAR {
-                if let Some(triangle) = Triangle::new([*a, *b, *c], width, height) {
-                    draw(&triangle, &Source { instance, face, placement: &placement, weights: WHOLE });
-                }
-            } else if a.depth >= Camera::NEAR || b.depth >= Camera::NEAR || c.depth >= Camera::NEAR {
-                if a.depth.is_nan() || b.depth.is_nan() || c.depth.is_nan() {
-                    continue;
-                }
-                let corners = [i, j, k].map(|v| placement.point(item.mesh.positions[v as usize].as_dvec3()));
-                let (cut, n) = cut_near(&corners);
-                let lens = Lens::new(camera);
-                let corner = |w: &[f64; 3]| {
-                    let p = corners[0] * w[0] + corners[1] * w[1] + corners[2] * w[2];
-                    lens.point(DVec3::new(p.x, p.y, p.z.min(-Camera::NEAR)))
-                };
-                for m in 2..n {
-                    let weights = [cut[0], cut[m - 1], cut[m]];
-                    if let Some(triangle) = Triangle::new(weights.each_ref().map(corner), width, height) {
-                        draw(&triangle, &Source { instance, face, placement: &placement, weights });
-                    }
+            let corners = [i, j, k].map(|v| placement.point(mesh.positions[v as usize].as_dvec3()));
+            let (cut, n) = cut_near(&corners);
+            let lens = Lens::new(camera);
+            let corner = |w: &[f64; 3]| {
+                let p = corners[0] * w[0] + corners[1] * w[1] + corners[2] * w[2];
+                lens.point(DVec3::new(p.x, p.y, p.z.min(-Camera::NEAR)))
+            };
+            for m in 2..n {
+                let weights = [cut[0], cut[m - 1], cut[m]];
+                if let Some(triangle) = Triangle::new(weights.each_ref().map(corner), width, height) {
+                    draw(&triangle, face, weights);
                 }
             }
         }
@@ -205,21 +220,110 @@ pub(super) fn draw_nearness(
     buffer: &mut Vec<f32>,
 ) -> DepthRange {
     let range = project(solid, camera, points);
-    let width = camera.width as usize;
     buffer.clear();
     buffer.resize(camera.pixels(), empty(camera));
-    each_triangle(solid, camera, points, |triangle, _| {
-        let [lo, hi] = triangle.limits;
-        triangle.runs(camera.width, camera.height, |run| {
-            let start = run.row * width;
-            let Some(pixels) = buffer.get_mut(start + run.from..start + run.to) else { return };
-            for (i, pixel) in pixels.iter_mut().enumerate() {
-                let q = (run.nearness + run.step * i as f32).max(lo).min(hi);
-                *pixel = if q > *pixel { q } else { *pixel };
-            }
-        });
-    });
+    let area = Area::whole(camera);
+    each_triangle(solid, camera, points, |triangle, _| fill(triangle, camera, &area, buffer));
     range
+}
+
+/// Draws the nearness of one mesh into `buffer` (the rows of the area, refilled here).
+pub(super) fn draw_mesh(
+    mesh: &Mesh,
+    placement: &Placement,
+    camera: &Camera,
+    points: &[Point],
+    area: &Area,
+    buffer: &mut Vec<f32>,
+) {
+    buffer.clear();
+    buffer.resize(area.pixels(), empty(camera));
+    mesh_triangles(mesh, placement, camera, points, |triangle, _, _| fill(triangle, camera, area, buffer));
+}
+
+/// Keeps the nearer of a triangle and what is there, in a buffer of an area's rows.
+#[inline]
+fn fill(triangle: &Triangle, camera: &Camera, area: &Area, buffer: &mut [f32]) {
+    let [lo, hi] = triangle.limits;
+    let columns = area.right - area.left;
+    triangle.runs(camera.width, camera.height, |run| {
+        let (from, to) = (run.from.max(area.left), run.to.min(area.right));
+        if run.row < area.top || from >= to {
+            return;
+        }
+        let (start, skipped) = ((run.row - area.top) * columns, from - run.from);
+        let Some(pixels) = buffer.get_mut(start + from - area.left..start + to - area.left) else { return };
+        for (i, pixel) in pixels.iter_mut().enumerate() {
+            // Comparisons that NaN fails are one instruction each, which `max` and `min` are not.
+            let q = run.nearness + run.step * (i + skipped) as f32;
+            let q = if q > lo { q } else { lo };
+            let q = if q < hi { q } else { hi };
+            *pixel = if q > *pixel { q } else { *pixel };
+        }
+    });
+}
+
+/// A rectangle of pixels inside an image: columns `left..right`, rows `top..bottom`.
+#[derive(Clone, Copy, Debug, Default, PartialEq, Eq)]
+pub(super) struct Area {
+    pub left: usize,
+    pub right: usize,
+    pub top: usize,
+    pub bottom: usize,
+}
+
+impl Area {
+    /// The whole image.
+    pub fn whole(camera: &Camera) -> Area {
+        Area { left: 0, right: camera.width as usize, top: 0, bottom: camera.height as usize }
+    }
+
+    /// All pixels that a mesh with these vertices can reach, and a margin of one for what rounding may do along long
+    /// edges. The whole image if the near plane cuts the mesh.
+    pub fn around(points: &[Point], camera: &Camera) -> Area {
+        let (mut x, mut y) = ([f64::INFINITY, f64::NEG_INFINITY], [f64::INFINITY, f64::NEG_INFINITY]);
+        let mut behind = false;
+        for p in points {
+            if p.depth >= Camera::NEAR {
+                x = [x[0].min(p.x), x[1].max(p.x)];
+                y = [y[0].min(p.y), y[1].max(p.y)];
+            } else {
+                behind |= !p.depth.is_nan();
+            }
+        }
+        // Nothing to draw.
+        if x[0] > x[1] {
+            return Area::default();
+        }
+        if behind {
+            return Area::whole(camera);
+        }
+        let span = |[low, high]: [f64; 2], side: u32| {
+            let (from, to) = (first_centre(low - 1.0, side) as usize, first_centre(high + 1.0, side) as usize);
+            (from, to.max(from))
+        };
+        let ((left, right), (top, bottom)) = (span(x, camera.width), span(y, camera.height));
+        Area { left, right, top, bottom }
+    }
+
+    /// The smallest rectangle around two; one without pixels counts for nothing.
+    pub fn with(&self, other: &Area) -> Area {
+        match (self.pixels(), other.pixels()) {
+            (_, 0) => *self,
+            (0, _) => *other,
+            _ => Area {
+                left: self.left.min(other.left),
+                right: self.right.max(other.right),
+                top: self.top.min(other.top),
+                bottom: self.bottom.max(other.bottom),
+            },
+        }
+    }
+
+    /// Number of pixels.
+    pub fn pixels(&self) -> usize {
+        (self.right - self.left) * (self.bottom - self.top)
+    }
 }
 
 /// The nearness of a pixel that shows nothing.

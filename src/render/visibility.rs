@@ -2,7 +2,8 @@
 //!
 //! On a contour itself the depth image is ambiguous by a pixel, so the looks go about one pixel to the side. It is not
 //! an exact hidden-line method: things closer together than about a pixel may be confused. A look that leaves the image
-//! is answered by the nearest pixel inside.
+//! is answered by the nearest pixel inside. What a look needs besides the depth image and the object's depth range is worked
+//! out when the piece is made, so a piece can be kept and looked at again when something else has moved.
 
 /// How far beside a piece to look, in pixels.
 const BESIDE: f64 = 1.2;
@@ -11,10 +12,10 @@ const BESIDE: f64 = 1.2;
 const TOLERANCE: f64 = 0.006;
 
 /// Largest slack for the slope of an edge's own faces, as a share of the depth range.
-pub(super) const EDGE_SLACK: f64 = 0.06;
+const EDGE_SLACK: f64 = 0.06;
 
 /// Largest slack for the extent of a silhouette's own face, as a share of the depth range.
-pub(super) const SILHOUETTE_SLACK: f64 = 0.15;
+const SILHOUETTE_SLACK: f64 = 0.15;
 
 /// How a piece is looked at.
 #[derive(Clone, Copy, Debug)]
@@ -33,50 +34,119 @@ pub(super) enum Look {
     },
 }
 
+/// A look to one side of a piece.
+#[derive(Clone, Copy, Debug)]
+struct Side {
+    /// The pixel looked at, [`NOWHERE`] for a side that does not count.
+    pixel: u32,
+    /// Whether the place looked at is inside the image.
+    inside: bool,
+    /// How much nearer the piece's own faces reach, before it is held against the depth range.
+    slack: f64,
+}
+
+/// No pixel: there is one less than this in the largest buffer.
+const NOWHERE: u32 = u32::MAX;
+
+/// A piece of contour that may be hidden: a function of its own part and the camera alone.
+#[derive(Clone, Copy, Debug)]
+pub(super) struct Piece {
+    /// As in [`Contours`](super::Contours).
+    pub x: f32,
+    pub y: f32,
+    pub tx: f32,
+    pub ty: f32,
+    pub length: f32,
+    /// A crease or boundary, not a smooth silhouette.
+    edge: bool,
+    /// Scene units.
+    depth: f64,
+    sides: [Side; 2],
+}
+
+/// Makes the pieces of an image.
+#[derive(Clone, Copy, Debug)]
+pub(super) struct Image {
+    width: usize,
+    height: usize,
+}
+
+impl Image {
+    /// `None` for an image without pixels, or with more than can be numbered.
+    pub fn new(width: u32, height: u32) -> Option<Image> {
+        let pixels = u64::from(width) * u64::from(height);
+        (pixels > 0 && pixels < u64::from(NOWHERE)).then_some(Image { width: width as usize, height: height as usize })
+    }
+
+    /// The look at the pixel that holds a position, or the nearest one.
+    #[inline]
+    fn side(&self, x: f64, y: f64, slack: f64) -> Side {
+        let inside = x >= 0.0 && y >= 0.0 && x < self.width as f64 && y < self.height as f64;
+        let (column, row) = ((x.max(0.0) as usize).min(self.width - 1), (y.max(0.0) as usize).min(self.height - 1));
+        Side { pixel: (row * self.width + column) as u32, inside, slack }
+    }
+
+    /// A piece with its middle at a position and depth, of an edge or of a smooth silhouette.
+    #[inline]
+    pub fn piece(
+        &self,
+        [x, y]: [f64; 2],
+        depth: f64,
+        [tx, ty]: [f64; 2],
+        length: f64,
+        look: &Look,
+        edge: bool,
+    ) -> Piece {
+        let sides = match *look {
+            Look::Outward { direction: [dx, dy], slack } => {
+                let none = Side { pixel: NOWHERE, inside: true, slack: 0.0 };
+                [self.side(x + BESIDE * dx, y + BESIDE * dy, slack), none]
+            }
+            Look::BothSides { direction: [dx, dy], slack: [first, second] } => [
+                self.side(x + BESIDE * dx, y + BESIDE * dy, first),
+                self.side(x - BESIDE * dx, y - BESIDE * dy, second),
+            ],
+        };
+        let [x, y, tx, ty, length] = [x, y, tx, ty, length].map(|v| v as f32);
+        Piece { x, y, tx, ty, length, edge, depth, sides }
+    }
+}
+
 /// A depth image to look into.
 pub(super) struct Depths<'a> {
     depth: &'a [f32],
-    width: usize,
-    height: usize,
     tolerance: f64,
+    /// Largest slack of silhouettes and of edges.
+    most: [f64; 2],
 }
 
 impl<'a> Depths<'a> {
     /// `extent` is the depth range of the object in scene units. `None` unless the sizes agree and are not zero.
     pub fn new(depth: &'a [f32], width: u32, height: u32, extent: f64) -> Option<Depths<'a>> {
-        let (width, height) = (width as usize, height as usize);
-        let fits = depth.len() == width * height && !depth.is_empty();
-        fits.then_some(Depths { depth, width, height, tolerance: TOLERANCE * extent })
-    }
-
-    /// Depth at the pixel that holds a position, or the nearest one; whether it was inside.
-    #[inline]
-    fn at(&self, x: f64, y: f64) -> (f64, bool) {
-        let (last_x, last_y) = (self.width - 1, self.height - 1);
-        let inside = x >= 0.0 && y >= 0.0 && x < self.width as f64 && y < self.height as f64;
-        let (column, row) = ((x.max(0.0) as usize).min(last_x), (y.max(0.0) as usize).min(last_y));
-        (self.depth.get(row * self.width + column).map_or(f64::INFINITY, |&d| f64::from(d)), inside)
+        let fits = depth.len() == width as usize * height as usize && !depth.is_empty();
+        fits.then_some(Depths {
+            depth,
+            tolerance: TOLERANCE * extent,
+            most: [SILHOUETTE_SLACK * extent, EDGE_SLACK * extent],
+        })
     }
 
     /// Whether nothing beside the piece is nearer than its `depth` less the slack.
     #[inline]
-    fn free(&self, x: f64, y: f64, depth: f64, slack: f64) -> bool {
-        let (seen, inside) = self.at(x, y);
+    fn free(&self, side: &Side, depth: f64, most: f64) -> bool {
+        let seen = self.depth.get(side.pixel as usize).map_or(f64::INFINITY, |&d| f64::from(d));
+        let slack = side.slack.min(most);
         // Outside the image only the object itself can be looked at: be generous, its side may bend towards the eye.
-        let slack = if inside { slack } else { slack.max(10.0 * self.tolerance) };
+        let slack = if side.inside { slack } else { slack.max(10.0 * self.tolerance) };
         seen >= depth - slack - self.tolerance - 1e-6 * depth
     }
 
-    /// Whether a piece at a position and depth is seen.
+    /// Whether a piece is seen.
     #[inline]
-    pub fn visible(&self, x: f64, y: f64, depth: f64, look: &Look) -> bool {
-        match *look {
-            Look::Outward { direction: [dx, dy], slack } => self.free(x + BESIDE * dx, y + BESIDE * dy, depth, slack),
-            Look::BothSides { direction: [dx, dy], slack: [first, second] } => {
-                self.free(x + BESIDE * dx, y + BESIDE * dy, depth, first)
-                    || self.free(x - BESIDE * dx, y - BESIDE * dy, depth, second)
-            }
-        }
+    pub fn visible(&self, piece: &Piece) -> bool {
+        let most = self.most[usize::from(piece.edge)];
+        let [first, second] = &piece.sides;
+        self.free(first, piece.depth, most) || (second.pixel != NOWHERE && self.free(second, piece.depth, most))
     }
 }
 
@@ -89,30 +159,42 @@ mod tests {
         (0..64).map(|i| if i % 8 < 4 { 1.0 } else { f32::INFINITY }).collect()
     }
 
+    fn seen(extent: f64, at: [f64; 2], depth: f64, look: &Look, edge: bool) -> bool {
+        let image = half();
+        let piece = Image::new(8, 8).unwrap().piece(at, depth, [0.0, 1.0], 1.0, look, edge);
+        Depths::new(&image, 8, 8, extent).unwrap().visible(&piece)
+    }
+
     #[test]
     fn looks_outward_past_its_own_object() {
-        let depth = half();
-        let depths = Depths::new(&depth, 8, 8, 1.0).unwrap();
         let out = Look::Outward { direction: [1.0, 0.0], slack: 0.0 };
         let back = Look::Outward { direction: [-1.0, 0.0], slack: 0.0 };
-        assert!(depths.visible(4.0, 4.0, 2.0, &out));
-        assert!(!depths.visible(4.0, 4.0, 2.0, &back));
-        assert!(!depths.visible(2.0, 4.0, 2.0, &out));
-        assert!(depths.visible(2.0, 4.0, 0.999, &back));
+        assert!(seen(1.0, [4.0, 4.0], 2.0, &out, false));
+        assert!(!seen(1.0, [4.0, 4.0], 2.0, &back, false));
+        assert!(!seen(1.0, [2.0, 4.0], 2.0, &out, false));
+        assert!(seen(1.0, [2.0, 4.0], 0.999, &back, false));
+    }
+
+    #[test]
+    fn slack_is_given_up_to_a_share_of_the_depth_range() {
         let slack = Look::Outward { direction: [1.0, 0.0], slack: 1.0 };
-        assert!(depths.visible(2.0, 4.0, 2.0, &slack));
+        assert!(seen(10.0, [2.0, 4.0], 2.0, &slack, false));
+        assert!(!seen(1.0, [2.0, 4.0], 2.0, &slack, false));
+        // 0.15 and 0.06 of the depth range, and the tolerance of 0.006.
+        for (depth, silhouette, edge) in [(1.05, true, true), (1.1, true, false), (1.2, false, false)] {
+            assert_eq!(seen(1.0, [2.0, 4.0], depth, &slack, false), silhouette);
+            assert_eq!(seen(1.0, [2.0, 4.0], depth, &slack, true), edge);
+        }
     }
 
     #[test]
     fn one_free_side_is_enough_and_the_border_does_not_panic() {
-        let depth = half();
-        let depths = Depths::new(&depth, 8, 8, 1.0).unwrap();
         let both = Look::BothSides { direction: [1.0, 0.0], slack: [0.0; 2] };
-        assert!(depths.visible(4.0, 4.0, 2.0, &both));
-        assert!(!depths.visible(2.0, 4.0, 2.0, &both));
-        assert!(depths.visible(8.0, 8.0, 2.0, &both));
-        assert!(!depths.visible(0.0, 0.0, 2.0, &both));
-        assert!(Depths::new(&depth, 8, 7, 1.0).is_none());
-        assert!(Depths::new(&[], 0, 0, 1.0).is_none());
+        assert!(seen(1.0, [4.0, 4.0], 2.0, &both, true));
+        assert!(!seen(1.0, [2.0, 4.0], 2.0, &both, true));
+        assert!(seen(1.0, [8.0, 8.0], 2.0, &both, true));
+        assert!(!seen(1.0, [0.0, 0.0], 2.0, &both, true));
+        assert!(Depths::new(&half(), 8, 7, 1.0).is_none());
+        assert!(Depths::new(&[], 0, 0, 1.0).is_none() && Image::new(0, 3).is_none());
     }
 }

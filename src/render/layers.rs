@@ -1,0 +1,230 @@
+//! What each mesh of a solid adds to the picture, kept from drawing to drawing: its depth in a rectangle, its pieces of contour
+//! before any is hidden, its depth range. When one part of a body has moved, the others are not drawn again.
+//!
+//! Not a cache of pictures: those are composed every time, the nearest layer at each pixel, and every piece is looked at anew.
+//! Invariant: a layer is a function of mesh, placement and camera alone, and 1 / q falls as q grows, in `f32` too, so the
+//! nearest of the layers' depths is the depth drawn at once, and the contours are those drawn at once, bit for bit.
+
+use super::contours::Contours;
+use super::frame::to_depth;
+use super::project::{DepthRange, Lens, Placement, Point, project_mesh};
+use super::raster::{Area, draw_mesh};
+use super::trace::trace_mesh;
+use super::visibility::{Depths, Piece};
+use super::{Camera, Projection};
+use crate::geom::{Affine, Instance, Mesh, Solid};
+use std::cell::RefCell;
+use std::sync::{Arc, Weak};
+
+/// A solid of fewer meshes is drawn at once: each is likely to have moved.
+const FEWEST: usize = 3;
+
+/// A solid of more meshes is drawn at once: two drawings would not fit.
+const MOST: usize = SLOTS / 2;
+
+/// The most layers kept by a thread.
+const SLOTS: usize = 128;
+
+/// The most memory kept by a thread's layers after a drawing. A solid that could need more by itself is drawn at once.
+const BYTES: usize = 32 << 20;
+
+/// What one mesh adds to a picture.
+#[derive(Default)]
+struct Layer {
+    area: Area,
+    /// Depth in the area, row by row, infinite off the mesh.
+    depth: Vec<f32>,
+    range: DepthRange,
+    pieces: Vec<Piece>,
+}
+
+/// A layer and what it belongs to.
+struct Slot {
+    /// Held weakly, so that a mesh that is gone can be told and its address is not used again.
+    mesh: Weak<Mesh>,
+    affine: [u64; 12],
+    camera: [u64; 17],
+    /// The drawing that used it last.
+    used: u64,
+    layer: Layer,
+}
+
+/// A thread's layers, and the picture composed last.
+#[derive(Default)]
+struct Layers {
+    slots: Vec<Slot>,
+    /// Drawings so far.
+    clock: u64,
+    /// Memory of all layers.
+    bytes: usize,
+    /// The slot of each mesh in the picture.
+    shown: Vec<usize>,
+    /// Depth of the picture.
+    depth: Vec<f32>,
+    /// Size of the picture.
+    size: [u32; 2],
+    /// Outside this the picture shows nothing.
+    drawn: Area,
+    points: Vec<Point>,
+    facing: Vec<f64>,
+    /// Number of pieces seen the last time.
+    found: usize,
+}
+
+thread_local! {
+    static LAYERS: RefCell<Layers> = RefCell::new(Layers::default());
+}
+
+/// The contours of a solid, composed of layers; `None` for solids that are better drawn at once.
+pub(super) fn contours(solid: &Solid, camera: &Camera) -> Option<Contours> {
+    let count = solid.instances().len();
+    let most_bytes = camera.pixels().saturating_mul(count).saturating_mul(size_of::<f32>());
+    if !(FEWEST..=MOST).contains(&count) || most_bytes > BYTES {
+        return None;
+    }
+    LAYERS.with(|layers| layers.try_borrow_mut().ok()?.contours(solid, camera))
+}
+
+impl Layers {
+    fn contours(&mut self, solid: &Solid, camera: &Camera) -> Option<Contours> {
+        let range = self.compose(solid, camera);
+        let depths = Depths::new(&self.depth, camera.width, camera.height, range.extent())?;
+        let mut out = Contours::with_room(camera, self.found);
+        for slot in self.shown.iter().filter_map(|&at| self.slots.get(at)) {
+            for piece in &slot.layer.pieces {
+                if depths.visible(piece) {
+                    out.push(piece);
+                }
+            }
+        }
+        self.found = out.len();
+        self.trim();
+        Some(out)
+    }
+
+    /// Brings the depth picture and the list of layers in it up to date.
+    fn compose(&mut self, solid: &Solid, camera: &Camera) -> DepthRange {
+        self.clock += 1;
+        self.clear(camera);
+        let eye = camera_bits(camera);
+        let width = camera.width as usize;
+        let mut range = DepthRange::EMPTY;
+        self.shown.resize(solid.instances().len(), usize::MAX);
+        for (i, instance) in solid.instances().iter().enumerate() {
+            let affine = affine_bits(&instance.affine);
+            let is_it = |slot: &Slot| {
+                std::ptr::eq(slot.mesh.as_ptr(), Arc::as_ptr(&instance.mesh))
+                    && slot.affine == affine
+                    && slot.camera == eye
+            };
+            // Most often it is where it was.
+            let before = self.shown.get(i).copied().filter(|&at| self.slots.get(at).is_some_and(is_it));
+            let found = before.or_else(|| self.slots.iter().position(is_it));
+            let at = found.unwrap_or_else(|| self.draw(instance, camera, affine, eye));
+            let (Some(slot), Some(shown)) = (self.slots.get_mut(at), self.shown.get_mut(i)) else { continue };
+            *shown = at;
+            slot.used = self.clock;
+            range = range.and(&slot.layer.range);
+            slot.layer.show(&mut self.depth, width);
+            self.drawn = self.drawn.with(&slot.layer.area);
+        }
+        range
+    }
+
+    /// Empties the picture.
+    fn clear(&mut self, camera: &Camera) {
+        let (size, width) = ([camera.width, camera.height], camera.width as usize);
+        if self.size == size && self.depth.len() == camera.pixels() {
+            for row in self.drawn.top..self.drawn.bottom {
+                let row = self.depth.get_mut(row * width + self.drawn.left..row * width + self.drawn.right);
+                row.unwrap_or_default().fill(f32::INFINITY);
+            }
+        } else {
+            self.depth.clear();
+            self.depth.resize(camera.pixels(), f32::INFINITY);
+            self.size = size;
+        }
+        self.drawn = Area::default();
+    }
+
+    /// Draws a layer and says where it is: in the place of one whose mesh is gone, in a new place, or in that of the one
+    /// that was not used for longest.
+    fn draw(&mut self, instance: &Instance, camera: &Camera, affine: [u64; 12], eye: [u64; 17]) -> usize {
+        let gone = self.slots.iter().position(|s| s.mesh.strong_count() == 0);
+        let oldest = || (0..self.slots.len()).min_by_key(|&i| self.slots[i].used);
+        let at = gone.or_else(|| if self.slots.len() < SLOTS { None } else { oldest() }).unwrap_or(self.slots.len());
+        if at == self.slots.len() {
+            self.slots.push(Slot { mesh: Weak::new(), affine, camera: eye, used: 0, layer: Layer::default() });
+        }
+        let slot = &mut self.slots[at];
+        self.bytes -= slot.layer.bytes();
+        (slot.mesh, slot.affine, slot.camera) = (Arc::downgrade(&instance.mesh), affine, eye);
+        slot.layer.draw(instance, camera, &mut self.points, &mut self.facing);
+        self.bytes += slot.layer.bytes();
+        at
+    }
+
+    /// Frees layers until they keep to their limit: of meshes that are gone, then those not used for longest.
+    fn trim(&mut self) {
+        while self.bytes > BYTES {
+            let age = |slot: &Slot| if slot.mesh.strong_count() == 0 { 0 } else { slot.used };
+            let Some(at) = (0..self.slots.len()).min_by_key(|&i| age(&self.slots[i])) else { return };
+            self.bytes -= self.slots.swap_remove(at).layer.bytes();
+        }
+    }
+}
+
+impl Layer {
+    /// Draws a mesh alone.
+    fn draw(&mut self, instance: &Instance, camera: &Camera, points: &mut Vec<Point>, facing: &mut Vec<f64>) {
+        let placement = Placement::new(camera, &instance.affine);
+        points.clear();
+        self.range = project_mesh(&instance.mesh, &placement, &Lens::new(camera), points);
+        self.area = Area::around(points, camera);
+        draw_mesh(&instance.mesh, &placement, camera, points, &self.area, &mut self.depth);
+        to_depth(camera, &mut self.depth);
+        self.pieces.clear();
+        trace_mesh(&instance.mesh, &placement, camera, points, facing, |piece| self.pieces.push(piece));
+    }
+
+    /// Puts what is nearer than the picture into it.
+    fn show(&self, picture: &mut [f32], width: usize) {
+        let columns = self.area.right - self.area.left;
+        if columns == 0 {
+            return;
+        }
+        for (row, own) in (self.area.top..self.area.bottom).zip(self.depth.chunks_exact(columns)) {
+            let Some(there) = picture.get_mut(row * width + self.area.left..row * width + self.area.right) else {
+                return;
+            };
+            for (there, own) in there.iter_mut().zip(own) {
+                *there = if *own < *there { *own } else { *there };
+            }
+        }
+    }
+
+    fn bytes(&self) -> usize {
+        self.depth.capacity() * size_of::<f32>() + self.pieces.capacity() * size_of::<Piece>()
+    }
+}
+
+fn affine_bits(affine: &Affine) -> [u64; 12] {
+    affine.0.to_cols_array().map(f64::to_bits)
+}
+
+fn camera_bits(camera: &Camera) -> [u64; 17] {
+    let (kind, scale, cx, cy) = match camera.projection {
+        Projection::Pinhole { focal_px, cx, cy } => (0, focal_px, cx, cy),
+        Projection::Orthographic { units_per_pixel, cx, cy } => (1, units_per_pixel, cx, cy),
+    };
+    let axes = [camera.eye, camera.right, camera.up, camera.forward].map(|v| v.to_array().map(f64::to_bits));
+    let mut out = [0; 17];
+    out[..12].copy_from_slice(axes.as_flattened());
+    let size = u64::from(camera.width) << 32 | u64::from(camera.height);
+    out[12..].copy_from_slice(&[size, kind, scale.to_bits(), cx.to_bits(), cy.to_bits()]);
+    out
+}
+
+#[cfg(test)]
+#[path = "layers_tests.rs"]
+mod tests;

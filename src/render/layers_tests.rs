@@ -1,0 +1,152 @@
+//! Layers against drawing everything at once, bit for bit, over sequences of changes; and their limits.
+
+use super::*;
+use crate::render::testing::{Uniform, cuboid, lathe, sphere};
+use crate::render::{Channels, Frame};
+use glam::{DVec3, Vec3};
+
+/// A mesh in posed coordinates: a ball, a box, an open or a closed lathe, somewhere.
+fn part(random: &mut Uniform) -> Arc<Mesh> {
+    let at =
+        |random: &mut Uniform, s: f64| DVec3::new(random.between(-s, s), random.between(-s, s), random.between(-s, s));
+    let profile = [(0.5, -0.8), (0.7, -0.1), (0.4, 0.6)];
+    let shape = match (random.next() * 4.0) as u32 {
+        0 => sphere(11, 7),
+        1 => cuboid(Vec3::new(0.4, 0.9, 0.3)),
+        2 => lathe(&profile, 9, false),
+        _ => lathe(&profile, 13, true),
+    };
+    let (middle, turn, size) = (at(random, 1.0), at(random, 2.0), DVec3::splat(random.between(0.2, 0.7)));
+    Arc::new(shape.placed(Affine::new(middle, turn, size)).to_mesh().unwrap())
+}
+
+fn group(meshes: &[Arc<Mesh>], by: Affine) -> Solid {
+    let solids: Vec<_> = meshes.iter().map(|m| Solid::new(m.clone())).collect();
+    Solid::group(&solids).placed(by)
+}
+
+fn bits(values: &[f32]) -> Vec<u32> {
+    values.iter().map(|v| v.to_bits()).collect()
+}
+
+/// The layers' picture and contours are those drawn at once.
+fn check(layers: &mut Layers, solid: &Solid, camera: &Camera) {
+    let (got, wanted) = (layers.contours(solid, camera).unwrap(), Contours::drawn(solid, camera));
+    assert_eq!(got, wanted);
+    for (a, b) in [(&got.x, &wanted.x), (&got.y, &wanted.y), (&got.length, &wanted.length)] {
+        assert_eq!(bits(a), bits(b));
+    }
+    assert_eq!(bits(&layers.depth), bits(&Frame::render(solid, camera, Channels::Depth).depth));
+    assert_eq!(layers.bytes, layers.slots.iter().map(|s| s.layer.bytes()).sum::<usize>());
+}
+
+#[test]
+fn layers_give_what_is_drawn_at_once() {
+    let mut random = Uniform(21);
+    let mut layers = Layers::default();
+    let mut pieces = 0;
+    for round in 0..10 {
+        let mut camera = Camera::default_for(40 + 7 * round, 96 - 5 * round);
+        if round % 3 == 1 {
+            camera.projection = Projection::Orthographic { units_per_pixel: 0.05, cx: 30.0, cy: 40.0 };
+        } else if round % 3 == 2 {
+            // The near plane cuts some.
+            camera.eye.z = 0.4;
+        }
+        let mut meshes: Vec<_> = (0..3 + round).map(|_| part(&mut random)).collect();
+        let mut by = Affine::IDENTITY;
+        for step in 0..50 {
+            let before = (meshes.clone(), by);
+            if step % 10 == 9 {
+                let turn = DVec3::new(random.next(), random.next(), 0.3);
+                by = Affine::new(DVec3::new(0.2, 0.1, random.next()), turn, DVec3::new(-1.0, 1.0, 1.2));
+            }
+            for _ in 0..1 + step % 3 {
+                let at = (random.next() * meshes.len() as f64) as usize;
+                meshes[at] = part(&mut random);
+            }
+            check(&mut layers, &group(&meshes, by), &camera);
+            pieces += layers.found;
+            if random.next() < 0.5 {
+                (meshes, by) = before;
+                check(&mut layers, &group(&meshes, by), &camera);
+            }
+        }
+    }
+    assert!(pieces > 50_000, "{pieces}");
+}
+
+#[test]
+fn what_did_not_move_is_not_drawn_again() {
+    let mut random = Uniform(22);
+    let camera = Camera::default_for(64, 64);
+    let mut layers = Layers::default();
+    let mut meshes: Vec<_> = (0..22).map(|_| part(&mut random)).collect();
+    // Two of one mesh share a layer.
+    meshes[21] = meshes[20].clone();
+    check(&mut layers, &group(&meshes, Affine::IDENTITY), &camera);
+    assert_eq!(layers.slots.len(), 21);
+    let first = layers.shown.clone();
+    check(&mut layers, &group(&meshes, Affine::IDENTITY), &camera);
+    assert_eq!(layers.shown, first);
+    // A step that is not taken, many times: the layer of a mesh that is gone is used again.
+    for _ in 0..300 {
+        let old = std::mem::replace(&mut meshes[3], part(&mut random));
+        check(&mut layers, &group(&meshes, Affine::IDENTITY), &camera);
+        let same = layers.shown.iter().zip(&first).filter(|(a, b)| a == b).count();
+        assert_eq!((same, layers.slots.len()), (21, 22));
+        meshes[3] = old;
+    }
+    check(&mut layers, &group(&meshes, Affine::IDENTITY), &camera);
+    assert_eq!(layers.shown, first);
+    // Another place and another camera are other layers.
+    let by = Affine::new(DVec3::new(0.0, 1e-12, 0.0), DVec3::ZERO, DVec3::ONE);
+    check(&mut layers, &group(&meshes, by), &camera);
+    assert_eq!(layers.slots.len(), 22 + 20);
+    check(&mut layers, &group(&meshes, by), &Camera::default_for(64, 65));
+    assert_eq!(layers.slots.len(), 22 + 20 + 21);
+}
+
+#[test]
+fn number_and_memory_stay_bounded() {
+    let mut random = Uniform(23);
+    let mut layers = Layers::default();
+    let meshes: Vec<_> = (0..40).map(|_| part(&mut random)).collect();
+    for step in 0..12 {
+        let by = Affine::new(DVec3::new(0.01 * f64::from(step), 0.0, 0.0), DVec3::ZERO, DVec3::splat(2.0));
+        check(&mut layers, &group(&meshes, by), &Camera::default_for(64, 64));
+    }
+    assert_eq!(layers.slots.len(), SLOTS);
+    for step in 0..6 {
+        let by = Affine::new(DVec3::new(0.0, 0.01 * f64::from(step), 0.0), DVec3::ZERO, DVec3::splat(3.0));
+        check(&mut layers, &group(&meshes[..4], by), &Camera::default_for(1200, 1200));
+        assert!(layers.bytes <= BYTES, "{}", layers.bytes);
+    }
+    assert!(layers.bytes > BYTES / 2);
+}
+
+#[test]
+fn few_many_or_huge_are_drawn_at_once() {
+    let mut random = Uniform(24);
+    let meshes: Vec<_> = (0..MOST + 1).map(|_| part(&mut random)).collect();
+    let camera = Camera::default_for(48, 48);
+    for (count, kept) in [(0, false), (1, false), (2, false), (3, true), (MOST, true), (MOST + 1, false)] {
+        let solid = group(&meshes[..count], Affine::IDENTITY);
+        assert_eq!(contours(&solid, &camera).is_some(), kept, "{count}");
+        assert_eq!(Contours::of(&solid, &camera), Contours::drawn(&solid, &camera));
+    }
+    assert!(contours(&group(&meshes[..10], Affine::IDENTITY), &Camera::default_for(2000, 2000)).is_none());
+}
+
+#[test]
+fn what_cannot_be_seen_leaves_an_empty_layer() {
+    let camera = Camera::default_for(48, 48);
+    let mut layers = Layers::default();
+    let mut random = Uniform(25);
+    let meshes: Vec<_> = (0..3).map(|_| part(&mut random)).collect();
+    for at in [[0.0, 0.0, 30.0], [90.0, 0.0, 0.0], [0.0, -90.0, 0.0], [f64::NAN, 0.0, 0.0], [0.0, 0.0, -1e12]] {
+        let solid = group(&meshes, Affine::new(DVec3::from_array(at), DVec3::ZERO, DVec3::ONE));
+        check(&mut layers, &solid, &camera);
+        assert!(layers.found == 0 && layers.drawn.pixels() == 0, "{at:?}");
+    }
+}

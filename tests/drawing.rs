@@ -1,0 +1,177 @@
+//! Contours and depth of groups of parts, some of which move: the same bits as an earlier, plainer implementation gave, and
+//! the same whatever was drawn before.
+
+use glam::{DVec3, Vec3};
+use pcadlang::geom::{Affine, Mesh, Solid};
+use pcadlang::render::{Camera, Channels, Contours, Frame, Projection, View};
+use std::sync::Arc;
+
+/// Uniform numbers in 0..1, the same in every run.
+struct Uniform(u64);
+
+impl Uniform {
+    fn next(&mut self) -> f64 {
+        self.0 = self.0.wrapping_mul(6364136223846793005).wrapping_add(1442695040888963407);
+        let mut x = self.0;
+        x = (x ^ (x >> 33)).wrapping_mul(0xff51afd7ed558ccd);
+        ((x ^ (x >> 33)) >> 11) as f64 / (1u64 << 53) as f64
+    }
+
+    fn between(&mut self, low: f64, high: f64) -> f64 {
+        low + (high - low) * self.next()
+    }
+
+    fn below(&mut self, n: usize) -> usize {
+        ((self.next() * n as f64) as usize).min(n - 1)
+    }
+
+    fn vector(&mut self, size: f64) -> DVec3 {
+        DVec3::new(self.between(-size, size), self.between(-size, size), self.between(-size, size))
+    }
+}
+
+/// A surface of revolution about y, at times open at an end, at times with creases, somewhere about the origin.
+fn part(random: &mut Uniform) -> Arc<Mesh> {
+    let (rings, sides) = (4 + random.below(5) as u32, 5 + random.below(9) as u32);
+    let (radius, half, ends) = (random.between(0.1, 0.6), random.between(0.1, 0.9), random.below(3));
+    let place = Affine::new(random.vector(0.8), random.vector(2.0), DVec3::ONE);
+    let mut positions = Vec::new();
+    let mut triangles = Vec::new();
+    for ring in 0..rings {
+        let t = f64::from(ring) / f64::from(rings - 1);
+        let closed = (ring == 0 && ends > 0) || (ring + 1 == rings && ends > 1);
+        let r = if closed { 0.0 } else { radius * (1.0 - (2.0 * t - 1.0) * (2.0 * t - 1.0) * 0.7) };
+        for side in 0..sides {
+            let angle = std::f64::consts::TAU * f64::from(side) / f64::from(sides);
+            let p = DVec3::new(r * libm::sin(angle), half * (2.0 * t - 1.0), r * libm::cos(angle));
+            positions.push(place.point(p).as_vec3());
+            if ring + 1 < rings {
+                let (a, b) = (ring * sides + side, ring * sides + (side + 1) % sides);
+                triangles.push([a, b, b + sides]);
+                triangles.push([a, b + sides, a + sides]);
+            }
+        }
+    }
+    let parts = vec![0; triangles.len()];
+    let mut mesh = Mesh::new(positions, triangles, parts).unwrap();
+    if ends == 2 && random.next() < 0.5 {
+        Arc::make_mut(&mut mesh.topology).encloses = true;
+    }
+    Arc::new(mesh)
+}
+
+/// A camera: both projections, near and far, small and large, square and not.
+fn camera(random: &mut Uniform) -> Camera {
+    let (width, height) = (20 + random.below(110) as u32, 20 + random.below(110) as u32);
+    let mut camera = Camera::default_for(width, height);
+    camera.eye += random.vector(0.3);
+    match random.below(4) {
+        0 => {
+            let (cx, cy) = (random.between(0.3, 0.7) * f64::from(width), 0.5 * f64::from(height));
+            camera.projection = Projection::Orthographic { units_per_pixel: random.between(0.01, 0.06), cx, cy };
+        }
+        // Among the parts: the near plane cuts some.
+        1 => camera.eye.z = random.between(-0.5, 2.0),
+        _ => {}
+    }
+    camera
+}
+
+fn pose(random: &mut Uniform) -> Affine {
+    let mirror = if random.next() < 0.2 { -1.0 } else { 1.0 };
+    let scale = DVec3::new(mirror * random.between(0.6, 1.4), random.between(0.6, 1.4), 1.0);
+    Affine::new(random.vector(0.4), random.vector(1.0), scale)
+}
+
+fn group(meshes: &[Arc<Mesh>], by: Affine) -> Solid {
+    let solids: Vec<_> = meshes.iter().map(|m| Solid::new(m.clone())).collect();
+    Solid::group(&solids).placed(by)
+}
+
+/// Every bit of the contours, in order.
+fn bits(c: &Contours) -> Vec<u32> {
+    let lists = [&c.x, &c.y, &c.tx, &c.ty, &c.length];
+    [c.width, c.height].into_iter().chain(lists.into_iter().flatten().map(|v| v.to_bits())).collect()
+}
+
+/// Fowler, Noll and Vo's hash (FNV-1a) over words.
+fn hash(words: impl IntoIterator<Item = u32>, from: u64) -> u64 {
+    words.into_iter().fold(from, |h, w| (h ^ u64::from(w)).wrapping_mul(0x100000001b3))
+}
+
+#[test]
+fn contours_and_depth_are_those_of_the_plain_implementation() {
+    let mut random = Uniform(41);
+    let (mut contours, mut depth, mut pieces) = (0xcbf29ce484222325, 0xcbf29ce484222325, 0);
+    for _ in 0..400 {
+        let meshes: Vec<_> = (0..1 + random.below(8)).map(|_| part(&mut random)).collect();
+        let (solid, camera) = (group(&meshes, pose(&mut random)), camera(&mut random));
+        let c = Contours::of(&solid, &camera);
+        pieces += c.len();
+        contours = hash(bits(&c), contours);
+        let frame = Frame::render(&solid, &camera, Channels::Depth);
+        depth = hash(frame.depth.iter().map(|d| d.to_bits()), depth);
+    }
+    // Taken from the implementation that drew every part anew into one buffer.
+    assert_eq!(
+        (pieces, format!("{contours:016x}"), format!("{depth:016x}")),
+        (92_687, "f7234d505b76b448".into(), "a1904a0c8faa84df".into())
+    );
+}
+
+#[test]
+fn what_was_drawn_before_changes_nothing() {
+    let mut random = Uniform(42);
+    for _ in 0..12 {
+        let cameras = [camera(&mut random), camera(&mut random)];
+        let mut meshes: Vec<_> = (0..3 + random.below(20)).map(|_| part(&mut random)).collect();
+        let (mut by, mut eye) = (pose(&mut random), 0);
+        for _ in 0..40 {
+            let before = (meshes.clone(), by, eye);
+            match random.below(8) {
+                0 => by = pose(&mut random),
+                1 => eye = 1 - eye,
+                2 => meshes.push(part(&mut random)),
+                3 if meshes.len() > 3 => drop(meshes.swap_remove(random.below(meshes.len()))),
+                _ => {
+                    for _ in 0..1 + random.below(3) {
+                        let at = random.below(meshes.len());
+                        meshes[at] = part(&mut random);
+                    }
+                }
+            }
+            let (solid, camera) = (group(&meshes, by), cameras[eye]);
+            // By turns through a view and at once.
+            let here = match random.next() < 0.5 {
+                true => Contours::of(&solid, &camera),
+                false => (*View::new(solid.clone(), camera).contours(camera.width.max(camera.height))).clone(),
+            };
+            // Another thread has drawn nothing before.
+            let there = std::thread::scope(|s| s.spawn(|| Contours::of(&solid, &camera)).join().unwrap());
+            assert_eq!(bits(&here), bits(&there));
+            // A view with a frame looks into the frame's depth.
+            let view = View::new(solid, camera);
+            view.frame(camera.width.max(camera.height));
+            assert_eq!(bits(&here), bits(&view.contours(camera.width.max(camera.height))));
+            if random.next() < 0.6 {
+                (meshes, by, eye) = before;
+            }
+        }
+    }
+}
+
+#[test]
+fn a_part_that_moves_there_and_back_gives_the_first_picture() {
+    let mut random = Uniform(43);
+    let mut meshes: Vec<_> = (0..9).map(|_| part(&mut random)).collect();
+    let camera = Camera::default_for(96, 96);
+    let first = Contours::of(&group(&meshes, Affine::IDENTITY), &camera);
+    let old = std::mem::replace(&mut meshes[4], part(&mut random));
+    let moved = Contours::of(&group(&meshes, Affine::IDENTITY), &camera);
+    // The same numbers at another address.
+    meshes[4] = Arc::new((*old).clone());
+    let copy = Contours::of(&group(&meshes, Affine::IDENTITY), &camera);
+    assert_ne!(bits(&first), bits(&moved));
+    assert_eq!(bits(&first), bits(&copy));
+    assert!(first.len() > 100 && meshes.iter().all(|m| m.positions.iter().all(|p: &Vec3| p.is_finite())));
+}
