@@ -20,6 +20,7 @@ pub mod mask;
 pub mod nms;
 pub mod npy;
 pub mod photo;
+pub mod region;
 pub mod resize;
 mod thin;
 
@@ -36,3 +37,4 @@ pub use elements::{ComparatorError, Elements};
 pub use error::VisionError;
 pub use mask::{Mask, MaskLikelihood};
 pub use photo::{Limits, Photo};
+pub use region::{Region, RegionOptions};

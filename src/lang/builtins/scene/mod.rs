@@ -6,6 +6,7 @@
 mod compare;
 mod objects;
 mod observed;
+mod region;
 mod seeing;
 mod shapes;
 
@@ -36,7 +37,7 @@ const fn native(
 
 /// All of them.
 pub(super) fn all() -> impl Iterator<Item = Builtin> {
-    [shapes::TABLE, seeing::TABLE, compare::TABLE].into_iter().flatten().copied()
+    [shapes::TABLE, seeing::TABLE, compare::TABLE, region::TABLE].into_iter().flatten().copied()
 }
 
 /// A shape that cannot be made: numbers outside their domain reject a proposal, anything else ends the run.
