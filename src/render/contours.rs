@@ -54,6 +54,17 @@ impl Contours {
         })
     }
 
+    /// As [`Contours::of`], and the depth image it drew.
+    pub(super) fn and_depth(solid: &Solid, camera: &Camera) -> (Contours, Vec<f32>) {
+        with_scratch(|scratch| {
+            let mut depth = Vec::new();
+            let range = draw_nearness(solid, camera, &mut scratch.points, &mut depth);
+            to_depth(camera, &mut depth);
+            let contours = trace(solid, camera, &scratch.points, &depth, range.extent(), &mut scratch.facing);
+            (contours, depth)
+        })
+    }
+
     /// As [`Contours::of`], with the depth image of the same solid and camera drawn before.
     pub(super) fn with_depth(solid: &Solid, camera: &Camera, depth: &[f32]) -> Contours {
         with_scratch(|scratch| {

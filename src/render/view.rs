@@ -41,7 +41,7 @@ impl View {
     }
 
     /// A frame that has depth at least, in the picture whose longer side has `size` pixels (0 counts as 1): cheaper than
-    /// [`View::frame`], and the contours of that size, if asked for later, are found with it.
+    /// [`View::frame`], and drawn together with the contours of that size, whichever is asked for first.
     pub fn depth(&self, size: u32) -> Arc<Frame> {
         match find(&self.frames.lock().unwrap_or_else(PoisonError::into_inner), size) {
             Some(frame) => frame,
@@ -59,7 +59,13 @@ impl View {
             let camera = self.camera.scaled_to(size);
             match frame {
                 Some(frame) => Contours::with_depth(&self.solid, &camera, &frame.depth),
-                None => Contours::of(&self.solid, &camera),
+                None => {
+                    let (contours, depth) = Contours::and_depth(&self.solid, &camera);
+                    let (width, height) = (camera.width, camera.height);
+                    let frame = Frame { width, height, depth, part: Vec::new(), normal: Vec::new() };
+                    once(&self.depths, size, || frame);
+                    contours
+                }
             }
         })
     }
@@ -121,6 +127,7 @@ mod tests {
         assert!(Arc::ptr_eq(&b.depth(96), &b.frame(96)));
         assert_eq!(*a.contours(96), *b.contours(96));
         assert_eq!(*a.contours(96), *c.contours(96));
+        assert_eq!(*a.depth(96), *depth);
         assert!(!a.contours(96).x.is_empty());
     }
 }
