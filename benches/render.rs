@@ -5,6 +5,8 @@ use criterion::{BatchSize, Criterion, criterion_group, criterion_main};
 use glam::{DVec3, Vec3};
 use pcadlang::geom::{Affine, Mesh, Solid};
 use pcadlang::render::{Camera, Channels, Contours, Frame, View};
+use pcadlang::vision::region::Scratch;
+use pcadlang::vision::{Limits, Region, RegionOptions};
 use std::hint::black_box;
 use std::sync::Arc;
 
@@ -141,5 +143,25 @@ fn body(c: &mut Criterion) {
     }
 }
 
-criterion_group!(benches, render, body);
+/// The region comparator alone, on a photograph at 128 pixels: counting and look-ups, and the shading term.
+fn region(c: &mut Criterion) {
+    let file = concat!(env!("CARGO_MANIFEST_DIR"), "/examples/images/coffee_cup.png");
+    let photo = pcadlang::vision::photo::load(file.as_ref(), &Limits::default()).expect("a photograph");
+    let (width, height) = pcadlang::vision::resize::fitted(photo.width(), photo.height(), 128);
+    let camera = Camera::default_for(width, height);
+    let solid = Solid::new(Arc::new(lathe(0.2)));
+    let mut step = 0.0;
+    let frame = Frame::render(&solid.placed(pose(&mut step)), &camera, Channels::All);
+    let groups: Vec<u8> = frame.mask().map(u8::from).collect();
+    let mut scratch = Scratch::default();
+    for (name, shading) in [("region/colours", 0.0), ("region/colours and shading", 0.05)] {
+        let options = RegionOptions { shading, ..RegionOptions::default() };
+        let region = Region::prepare(&photo, width, height, &options).expect("a region");
+        c.bench_function(name, |b| {
+            b.iter(|| region.log_likelihood_with(black_box(&groups), &frame.normal, &mut scratch))
+        });
+    }
+}
+
+criterion_group!(benches, render, body, region);
 criterion_main!(benches);

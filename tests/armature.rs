@@ -34,7 +34,8 @@ fn plain(body: &Armature, pose: &[JointPose]) -> Vec<DVec3> {
     };
     let mut m: Vec<DAffine3> = Vec::new();
     for (j, p) in body.rig().joints().iter().zip(pose) {
-        let own = DAffine3::from_translation(j.head) * DAffine3::from_mat3(matrix(p)) * DAffine3::from_translation(-j.head);
+        let own =
+            DAffine3::from_translation(j.head) * DAffine3::from_mat3(matrix(p)) * DAffine3::from_translation(-j.head);
         m.push(j.parent.map_or(own, |up| m[up] * own));
     }
     let moved = |(p, i): (&glam::Vec3, &pcadlang::geom::armature::Influence)| {
@@ -149,7 +150,8 @@ fn derivatives_of_posed_vertices_agree_with_differences() {
     let mut pose = poses()["p500"].clone();
     let foot = body.rig().find("foot_r").unwrap();
     pose[foot].location = DVec3::new(0.05, 0.02, -0.03);
-    let rules = Rules { stops: (0..22).map(|j| j == body.rig().find("thigh_r").unwrap()).collect(), inherit_scale: false };
+    let rules =
+        Rules { stops: (0..22).map(|j| j == body.rig().find("thigh_r").unwrap()).collect(), inherit_scale: false };
     let wave = |i: usize, a: f64| libm::sin(i as f64 * a + 0.5);
     let by_vertex: Vec<DVec3> =
         (0..body.positions().len()).map(|i| DVec3::new(wave(i, 0.3), wave(i, 0.7), wave(i, 1.1))).collect();

@@ -1,6 +1,6 @@
 //! A solid seen by a camera, with its frames and contours computed when first asked for.
 //!
-//! Not a scene graph and not mutable: another pose is another `View`. Invariant: for one image size the frame and the
+//! Not a scene graph and not mutable: another pose is another `View`. Invariant: for one image size the frame, the depth and the
 //! contours are computed once, and every caller gets the same `Arc`.
 
 use super::{Camera, Channels, Contours, Frame};
@@ -15,13 +15,14 @@ pub struct View {
     solid: Solid,
     camera: Camera,
     frames: BySize<Frame>,
+    depths: BySize<Frame>,
     contours: BySize<Contours>,
 }
 
 impl View {
     /// A view; nothing is drawn yet.
     pub fn new(solid: Solid, camera: Camera) -> View {
-        View { solid, camera, frames: Mutex::default(), contours: Mutex::default() }
+        View { solid, camera, frames: Mutex::default(), depths: Mutex::default(), contours: Mutex::default() }
     }
 
     /// The solid.
@@ -39,10 +40,22 @@ impl View {
         once(&self.frames, size, || Frame::render(&self.solid, &self.camera.scaled_to(size), Channels::All))
     }
 
+    /// A frame that has depth at least, in the picture whose longer side has `size` pixels (0 counts as 1): cheaper than
+    /// [`View::frame`], and contours of that size that are asked for later use it.
+    pub fn depth(&self, size: u32) -> Arc<Frame> {
+        match find(&self.frames.lock().unwrap_or_else(PoisonError::into_inner), size) {
+            Some(frame) => frame,
+            None => {
+                once(&self.depths, size, || Frame::render(&self.solid, &self.camera.scaled_to(size), Channels::Depth))
+            }
+        }
+    }
+
     /// The contours in the picture whose longer side has `size` pixels (0 counts as 1).
     pub fn contours(&self, size: u32) -> Arc<Contours> {
         once(&self.contours, size, || {
-            let frame = find(&self.frames.lock().unwrap_or_else(PoisonError::into_inner), size);
+            let drawn = |cache: &BySize<Frame>| find(&cache.lock().unwrap_or_else(PoisonError::into_inner), size);
+            let frame = drawn(&self.frames).or_else(|| drawn(&self.depths));
             let camera = self.camera.scaled_to(size);
             match frame {
                 Some(frame) => Contours::with_depth(&self.solid, &camera, &frame.depth),
@@ -101,7 +114,14 @@ mod tests {
             view.frame(96);
             view
         });
+        let c = View::new(sphere(32, 16), Camera::default_for(96, 96));
+        let depth = c.depth(96);
+        assert!(depth.part.is_empty() && Arc::ptr_eq(&depth, &c.depth(96)));
+        assert_eq!(depth.depth, b.frame(96).depth);
+        assert!(Arc::ptr_eq(&b.depth(96), &b.frame(96)));
         assert_eq!(*a.contours(96), *b.contours(96));
+        assert_eq!(*a.contours(96), *c.contours(96));
+        assert_eq!(*a.depth(96), *depth);
         assert!(!a.contours(96).x.is_empty());
     }
 }

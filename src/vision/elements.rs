@@ -93,6 +93,9 @@ pub enum ComparatorError {
     /// The observed map's lists have different lengths.
     #[error("the observed contours are damaged: their lists differ in length")]
     Map,
+    /// A quantised picture whose labels do not fit it.
+    #[error("a picture in few colours needs one label a pixel, each below the number of colours, 1 to 256")]
+    Labels,
     /// A gradient was asked of a comparator that has none.
     #[error("only the one-sided mean distance has a gradient")]
     NoGradient,

@@ -21,6 +21,7 @@ pub mod mask;
 pub mod nms;
 pub mod npy;
 pub mod photo;
+pub mod region;
 pub mod resize;
 mod thin;
 
@@ -38,3 +39,4 @@ pub use error::VisionError;
 pub use keypoints::{KeypointLikelihood, KeypointOptions, Keypoints};
 pub use mask::{Mask, MaskLikelihood};
 pub use photo::{Limits, Photo};
+pub use region::{Region, RegionOptions};

@@ -42,7 +42,15 @@ pub struct RunOptions {
 
 impl Default for RunOptions {
     fn default() -> Self {
-        RunOptions { seed: 0, steps: None, warmup: None, time: None, incremental: true, limits: Limits::default(), watch: None }
+        RunOptions {
+            seed: 0,
+            steps: None,
+            warmup: None,
+            time: None,
+            incremental: true,
+            limits: Limits::default(),
+            watch: None,
+        }
     }
 }
 

@@ -16,7 +16,7 @@ use std::sync::Arc;
 
 pub(super) const SECTION: &str = "Comparing";
 pub(super) const SEEN: Arg = arg("view", VIEW, "The view.");
-const SIZE: Arg =
+pub(super) const SIZE: Arg =
     opt("size", Type::Int, "128", "The longer side of the picture that is drawn, 8 to 4096.").unit("pixels");
 
 pub(super) const TABLE: &[Builtin] = &[
@@ -103,7 +103,7 @@ pub(super) fn view(a: &Args) -> Result<Arc<View>, Fault> {
     a.object::<ViewValue>(0, "a view").map(|v| Arc::clone(&v.0))
 }
 
-fn size(a: &Args, i: usize) -> Result<u32, Fault> {
+pub(super) fn size(a: &Args, i: usize) -> Result<u32, Fault> {
     if a.given(i) { a.int_in(i, 8, 4096).map(|n| n as u32) } else { Ok(128) }
 }
 
@@ -144,7 +144,7 @@ fn elements(c: &Contours) -> Elements<'_> {
 }
 
 /// The observed image, if its shape is that of the view's picture.
-fn image<'a>(observed: &'a Value, view: &View, what: &str) -> Result<&'a ImageValue, String> {
+pub(super) fn image<'a>(observed: &'a Value, view: &View, what: &str) -> Result<&'a ImageValue, String> {
     let Some(image) = observed.downcast::<ImageValue>() else {
         return Err(format!("{what}: the observed value must be an image, got {}", observed.type_name()));
     };

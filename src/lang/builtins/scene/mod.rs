@@ -8,6 +8,7 @@ mod compare;
 mod compare_keypoints;
 mod objects;
 mod observed;
+mod region;
 mod seeing;
 mod shapes;
 
@@ -39,7 +40,7 @@ const fn native(
 
 /// All of them.
 pub(super) fn all() -> impl Iterator<Item = Builtin> {
-    let tables = [shapes::TABLE, bodies::TABLE, seeing::TABLE, compare::TABLE, compare_keypoints::TABLE];
+    let tables = [shapes::TABLE, bodies::TABLE, seeing::TABLE, compare::TABLE, compare_keypoints::TABLE, region::TABLE];
     tables.into_iter().flatten().copied()
 }
 

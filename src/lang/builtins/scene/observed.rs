@@ -4,7 +4,7 @@
 use crate::lang::value::{Object, Value};
 use crate::vision::{
     Chamfer, ChamferOptions, ContourDetector, ContourMap, ContourRatio, ContourRatioOptions, DepthLikelihood, DepthMap,
-    GradientDetector, Keypoints, Mask, MaskLikelihood, Photo,
+    GradientDetector, Keypoints, Mask, MaskLikelihood, Photo, Region, RegionOptions,
 };
 use std::any::Any;
 use std::sync::{Arc, Mutex, OnceLock, PoisonError};
@@ -42,6 +42,7 @@ pub struct ImageValue {
     map: OnceLock<ContourMap>,
     pub(super) ratios: Prepared<Key<ContourRatioOptions>, ContourRatio>,
     pub(super) chamfers: Prepared<Key<ChamferOptions>, Chamfer>,
+    pub(super) regions: Prepared<Key<RegionOptions>, Region>,
 }
 
 impl ImageValue {

@@ -1,0 +1,192 @@
+//! The likelihood of a photograph's colours given a view: `scene.region`. The arithmetic is in [`crate::vision::region`]; here the
+//! drawn frame becomes a group for each pixel.
+
+use super::compare::{SECTION, SEEN, SIZE, image, likelihood, size, view};
+use super::native;
+use crate::lang::builtins::{Args, Builtin, Type, opt};
+use crate::lang::error::Fault;
+use crate::lang::value::{Likelihood, Value};
+use crate::render::View;
+use crate::vision::region::Scratch;
+use crate::vision::{Region, RegionOptions};
+use std::cell::RefCell;
+use std::sync::Arc;
+
+/// The most groups beside the background; parts from here on share the last one.
+const MOST_GROUPS: u16 = 15;
+
+pub(super) const TABLE: &[Builtin] = &[native(
+    "region",
+    SECTION,
+    &[
+        SEEN,
+        opt("power", Type::Num, "0.05", "The power of the term of the whole picture."),
+        opt("tiles", Type::Int, "8", "Tiles along each side of the picture, each with colours of its own; 0: none."),
+        opt("tile_power", Type::Num, "0.1", "The power of the term of the tiles."),
+        opt("colours", Type::Int, "32", "How many colours the photograph is reduced to, 2 to 256."),
+        opt(
+            "groups",
+            Type::Str,
+            "\"silhouette\"",
+            "What has colours of its own beside the background: \"silhouette\": the object; \"parts\": each of its parts, from the 15th on together.",
+        ),
+        opt(
+            "shading",
+            Type::Num,
+            "0",
+            "The power of the term that asks whether brightness follows the normals; 0: off.",
+        ),
+        SIZE,
+    ],
+    Type::Likelihood,
+    "The likelihood ratio of the photograph's colours: inside and outside told apart, against one background. A probability of pictures in few colours only with a power of 1 for one term, 0 for the others.",
+    region,
+)];
+
+#[derive(Debug, Clone, Copy, PartialEq, Eq)]
+enum Groups {
+    Silhouette,
+    Parts,
+}
+
+#[derive(Debug)]
+struct RegionOf {
+    view: Arc<View>,
+    size: u32,
+    groups: Groups,
+    options: RegionOptions,
+}
+
+fn region(a: &Args) -> Result<Value, Fault> {
+    let d = RegionOptions::default();
+    let whole = |i: usize, lo: i64, hi: i64, default: i64| if a.given(i) { a.int_in(i, lo, hi) } else { Ok(default) };
+    let options = RegionOptions {
+        power: a.num_or(1, d.power)?,
+        tiles: whole(2, 0, 64, i64::from(d.tiles))? as u32,
+        tile_power: a.num_or(3, d.tile_power)?,
+        colours: whole(4, 2, 256, d.colours as i64)? as usize,
+        shading: a.num_or(6, d.shading)?,
+        ..d
+    };
+    let groups = match a.choice(5, &["silhouette", "parts"])? {
+        "parts" => Groups::Parts,
+        _ => Groups::Silhouette,
+    };
+    likelihood(RegionOf { view: view(a)?, size: size(a, 7)?, groups, options })
+}
+
+thread_local! {
+    static SCRATCH: RefCell<(Vec<u8>, Scratch)> = RefCell::default();
+}
+
+impl Likelihood for RegionOf {
+    fn name(&self) -> &'static str {
+        "scene.region"
+    }
+
+    fn log_density(&self, observed: &Value) -> Result<f64, String> {
+        let image = image(observed, &self.view, self.name())?;
+        let Some(photo) = image.as_photo() else {
+            return Err("scene.region: colours need a photograph, and only a contour map was observed".into());
+        };
+        let outline = self.groups == Groups::Silhouette && self.options.shading == 0.0;
+        let frame = if outline { self.view.depth(self.size) } else { self.view.frame(self.size) };
+        let key = (self.options.clone(), frame.width, frame.height);
+        let region = image.regions.get(key, |(options, w, h)| {
+            Region::prepare(photo, *w, *h, options).map_err(|e| format!("scene.region: {e}"))
+        })?;
+        Ok(SCRATCH.with_borrow_mut(|(groups, scratch)| {
+            groups.clear();
+            match self.groups {
+                Groups::Silhouette => groups.extend(frame.mask().map(u8::from)),
+                Groups::Parts => groups.extend(frame.part.iter().map(|p| group(*p))),
+            }
+            region.log_likelihood_with(groups, &frame.normal, scratch)
+        }))
+    }
+
+    fn is_proper(&self) -> bool {
+        self.options.is_proper()
+    }
+}
+
+/// The group of a part: one each in their order, as far as there are groups.
+fn group(part: u16) -> u8 {
+    if part == u16::MAX { 0 } else { part.min(MOST_GROUPS - 1) as u8 + 1 }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+    use crate::geom::{Profile, Solid, lathe};
+    use crate::lang::builtins::scene::ImageValue;
+    use crate::render::Camera;
+    use crate::vision::{ContourMap, Photo};
+
+    fn vase(shift: f64) -> Arc<View> {
+        let parts =
+            [Profile { y: vec![-1.0, 0.0], r: vec![0.6, 0.8] }, Profile { y: vec![0.0, 1.0], r: vec![0.4, 0.3] }];
+        let mesh = lathe(&parts, 32, 0.0, crate::geom::Caps::Both).unwrap();
+        let by = crate::geom::Affine::new([shift, 0.0, 0.0].into(), [0.4, 0.0, 0.1].into(), [1.0; 3].into());
+        Arc::new(View::new(Solid::new(Arc::new(mesh)).placed(by), Camera::default_for(64, 64)))
+    }
+
+    /// A photograph of the vase, its parts in colours of their own and lit from above.
+    fn photograph() -> Value {
+        let frame = vase(0.0).frame(64);
+        let rgb = image::RgbImage::from_fn(64, 64, |x, y| {
+            let i = (y * 64 + x) as usize;
+            let noise = (x * 31 + y * 17 + x * y) % 23;
+            let base = match frame.part[i] {
+                u16::MAX => [90.0, 120.0, 150.0],
+                0 => [150.0, 60.0, 40.0],
+                _ => [80.0, 150.0, 60.0],
+            };
+            let light = if frame.part[i] == u16::MAX { 1.0 } else { 0.7 + 0.4 * frame.normal[i][1] };
+            image::Rgb(base.map(|b| (b * light) as u8 + noise as u8))
+        });
+        Value::object(ImageValue::photo(Photo::from_rgb(rgb).unwrap()))
+    }
+
+    fn of(shift: f64, groups: Groups, options: &RegionOptions) -> RegionOf {
+        RegionOf { view: vase(shift), size: 64, groups, options: options.clone() }
+    }
+
+    #[test]
+    fn the_true_place_wins_with_every_term() {
+        let photo = photograph();
+        let none = RegionOptions { power: 0.0, tile_power: 0.0, ..RegionOptions::default() };
+        for (groups, options) in [
+            (Groups::Silhouette, RegionOptions::default()),
+            (Groups::Parts, RegionOptions::default()),
+            (Groups::Silhouette, RegionOptions { power: 0.05, ..none.clone() }),
+            (Groups::Parts, RegionOptions { tile_power: 0.1, ..none.clone() }),
+            (Groups::Parts, RegionOptions { shading: 0.05, ..none.clone() }),
+        ] {
+            let at = |shift: f64| of(shift, groups, &options).log_density(&photo).unwrap();
+            let (right, near, far) = (at(0.0), at(0.15), at(50.0));
+            assert!(right > near && right > 1.0 && far == 0.0, "{options:?}: {right} {near} {far}");
+        }
+        let d = RegionOptions::default();
+        let silhouette = of(0.0, Groups::Silhouette, &d).log_density(&photo).unwrap();
+        assert!(of(0.0, Groups::Parts, &d).log_density(&photo).unwrap() > silhouette);
+    }
+
+    #[test]
+    fn contour_maps_and_other_things_are_refused() {
+        let l = of(0.0, Groups::Silhouette, &RegionOptions::default());
+        let map = Value::object(ImageValue::contours(ContourMap::new(64, 64), None));
+        assert!(l.log_density(&map).unwrap_err().contains("need a photograph"));
+        assert!(l.log_density(&Value::Num(1.0)).unwrap_err().contains("must be an image"));
+        let bad = RegionOptions { power: -1.0, ..RegionOptions::default() };
+        let said = of(0.0, Groups::Silhouette, &bad).log_density(&photograph()).unwrap_err();
+        assert!(said.contains("scene.region: power must be at least 0"), "{said}");
+        assert!(!l.is_proper());
+    }
+
+    #[test]
+    fn parts_beyond_the_last_group_share_it() {
+        assert_eq!([0, 1, 13, 14, 15, 900].map(group), [1, 2, 14, 15, 15, 15]);
+        assert_eq!(group(u16::MAX), 0);
+    }
+}
