@@ -13,8 +13,8 @@ use pcadlang::report::{ChainDraws, Memory, Quantity, RunDir, Tee, csv::CsvSink, 
 use pcadlang::vision::Photo;
 use pcadlang::{Model, RunOptions};
 use serde_json::{Map, Value, json};
-use std::sync::Arc;
 use std::sync::atomic::{AtomicBool, Ordering};
+use std::sync::{Arc, Mutex, PoisonError, Weak};
 use std::time::Instant;
 
 /// A program compiled with what it observes.
@@ -48,11 +48,44 @@ pub fn prepare(job: &Job, quiet: bool) -> Result<Ready, Failure> {
     Ok(Ready { model: program.compile()?, photo, begun })
 }
 
-/// Lets Ctrl-C end chains at their next step. For the first call only: then the handler stays.
-pub fn end_on_interrupt(progress: &Arc<Progress>) {
-    let cancel = Arc::clone(progress);
-    // A second handler cannot be set; then the system's own stays.
-    let _ = ctrlc::set_handler(move || cancel.cancelled.store(true, Ordering::Relaxed));
+/// Ctrl-C, for one run after the other.
+#[derive(Default)]
+pub struct Interrupt {
+    asked: AtomicBool,
+    run: Mutex<Weak<Progress>>,
+}
+
+impl Interrupt {
+    /// Listens from now on, until the command ends.
+    pub fn listen() -> Arc<Interrupt> {
+        let interrupt = Arc::new(Interrupt::default());
+        let heard = Arc::clone(&interrupt);
+        // If no handler can be set, the system's own stays.
+        let _ = ctrlc::set_handler(move || {
+            heard.asked.store(true, Ordering::SeqCst);
+            heard.pass_on();
+        });
+        interrupt
+    }
+
+    /// Whether the user has asked to end.
+    pub fn asked(&self) -> bool {
+        self.asked.load(Ordering::SeqCst)
+    }
+
+    /// Ends this run at its next step when asked, or at once if that was before.
+    fn ends(&self, run: &Arc<Progress>) {
+        *self.run.lock().unwrap_or_else(PoisonError::into_inner) = Arc::downgrade(run);
+        if self.asked() {
+            self.pass_on();
+        }
+    }
+
+    fn pass_on(&self) {
+        if let Some(run) = self.run.lock().unwrap_or_else(PoisonError::into_inner).upgrade() {
+            run.cancelled.store(true, Ordering::Relaxed);
+        }
+    }
 }
 
 /// The number of threads of a run.
@@ -118,11 +151,11 @@ pub fn perform(
     ready: &Ready,
     dir: &RunDir,
     record: &Map<String, Value>,
-    progress: &Progress,
+    interrupt: &Interrupt,
     live: bool,
 ) -> Result<Outcome, Failure> {
     write_record(dir, record, "running", json!({}))?;
-    fill(job, ready, dir, record, progress, live).inspect_err(|failure| {
+    fill(job, ready, dir, record, interrupt, live).inspect_err(|failure| {
         // The error that is told is the first one.
         let _ = record_failure(dir, record, failure, ready.begun.elapsed().as_secs_f64());
     })
@@ -133,7 +166,7 @@ fn fill(
     ready: &Ready,
     dir: &RunDir,
     record: &Map<String, Value>,
-    progress: &Progress,
+    interrupt: &Interrupt,
     live: bool,
 ) -> Result<Outcome, Failure> {
     let Ready { model, photo, begun } = ready;
@@ -151,10 +184,11 @@ fn fill(
     };
     let memories: Vec<Memory> = (0..s.chains).map(|_| Memory::default()).collect();
     let sinks = sinks(dir, job, model, &memories)?;
-    let done = AtomicBool::new(false);
+    let (progress, done) = (Arc::new(Progress::default()), AtomicBool::new(false));
+    interrupt.ends(&progress);
     let results = std::thread::scope(|scope| {
-        scope.spawn(|| progress::watch(progress, &done, options.time, !live));
-        let results = model.run_into(&options, threads(job), progress, sinks);
+        scope.spawn(|| progress::watch(&progress, &done, options.time, !live));
+        let results = model.run_into(&options, threads(job), &progress, sinks);
         done.store(true, Ordering::Relaxed);
         results
     })?;

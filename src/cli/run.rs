@@ -1,13 +1,11 @@
 //! `pcadlang run`: one run, its folder, and what is said of it at the end.
 
 use super::args::Run;
-use super::job::{self, Outcome};
+use super::job::{self, Interrupt, Outcome};
 use super::{Failure, plain};
-use pcadlang::infer::Progress;
 use pcadlang::report::{RunDir, seconds, table};
 use serde_json::json;
 use std::path::Path;
-use std::sync::Arc;
 
 /// Runs a program and leaves its folder.
 pub fn run(a: &Run) -> Result<(), Failure> {
@@ -21,10 +19,9 @@ pub fn run(a: &Run) -> Result<(), Failure> {
         None => RunDir::fresh(Path::new("runs"), stem(&a.job.given.program)),
     };
     let dir = dir.map_err(|e| plain(e.to_string()))?;
-    let progress = Arc::new(Progress::default());
-    job::end_on_interrupt(&progress);
+    let interrupt = Interrupt::listen();
     let record = job::record(&a.job, ready.model.hash());
-    let outcome = job::perform(&a.job, &ready, &dir, &record, &progress, !(a.quiet || a.json))?;
+    let outcome = job::perform(&a.job, &ready, &dir, &record, &interrupt, !(a.quiet || a.json))?;
     show(a, &dir, &outcome);
     if outcome.interrupted { Err(Failure::Interrupted) } else { Ok(()) }
 }

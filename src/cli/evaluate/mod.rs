@@ -8,15 +8,14 @@ mod observed;
 mod resume;
 
 use super::args::{Evaluate, Given, Job};
+use super::job::Interrupt;
 use super::{Failure, given, job, plain, term};
 use dataset::{Case, Dataset, Layout};
 use observed::{Detections, Items, observations_for};
-use pcadlang::infer::Progress;
 use pcadlang::report::evaluation::{EvaluationDir, MARK, PREDICTIONS, Row, TABLE, markdown, prediction};
 use pcadlang::report::{RunDir, bytes_hash, number, seconds};
 use serde_json::{Map, Value, json};
 use std::sync::Arc;
-use std::sync::atomic::Ordering;
 use std::time::Instant;
 
 /// A case on its way.
@@ -38,14 +37,13 @@ struct Evaluation<'a> {
     tasks: Vec<Task>,
     /// What `evaluation.json` begins with.
     head: Map<String, Value>,
-    progress: Arc<Progress>,
+    interrupt: Arc<Interrupt>,
 }
 
 /// Runs a program over a dataset.
 pub fn evaluate(a: &Evaluate) -> Result<(), Failure> {
     let mut e = Evaluation::prepare(a)?;
     e.save()?;
-    job::end_on_interrupt(&e.progress);
     let chosen: Vec<usize> = (0..e.tasks.len()).filter(|&i| e.tasks[i].chosen).collect();
     let mut failed = Vec::new();
     let mut interrupted = false;
@@ -63,7 +61,7 @@ pub fn evaluate(a: &Evaluate) -> Result<(), Failure> {
             failed.push(e.tasks[i].case.name.clone());
         }
         e.save()?;
-        interrupted = e.progress.cancelled.load(Ordering::Relaxed);
+        interrupted = e.interrupt.asked();
         if interrupted {
             break;
         }
@@ -122,7 +120,7 @@ impl<'a> Evaluation<'a> {
             Task { case, job, record, chosen, row: None }
         };
         let tasks = cases.into_iter().map(task).collect();
-        let mut e = Evaluation { a, layout, dir, tasks, head: Map::new(), progress: Arc::new(Progress::default()) };
+        let mut e = Evaluation { a, layout, dir, tasks, head: Map::new(), interrupt: Interrupt::listen() };
         e.take_up()?;
         e.head = e.head();
         for name in skipped {
@@ -181,8 +179,6 @@ impl<'a> Evaluation<'a> {
     fn run(&self, i: usize) -> (Row, Option<Failure>) {
         let t = &self.tasks[i];
         let begun = Instant::now();
-        self.progress.steps.store(0, Ordering::Relaxed);
-        self.progress.best.store(0, Ordering::Relaxed);
         match self.fill(t) {
             Ok(()) => {
                 let run = resume::left(&self.dir.file(&t.case.name)).unwrap_or_default();
@@ -209,7 +205,7 @@ impl<'a> Evaluation<'a> {
             let _ = job::record_failure(&dir, &t.record, failure, begun.elapsed().as_secs_f64());
         })?;
         let live = !(self.a.quiet || self.a.json);
-        job::perform(&t.job, &ready, &dir, &t.record, &self.progress, live).map(|_| ())
+        job::perform(&t.job, &ready, &dir, &t.record, &self.interrupt, live).map(|_| ())
     }
 
     fn rows(&self) -> Vec<Row> {
