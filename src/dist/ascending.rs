@@ -18,7 +18,8 @@ pub(super) fn to_free(one: &Support, xs: &[f64], out: &mut Vec<f64>) {
     let mut last = None;
     for x in xs {
         let u = one.to_free_scalar(*x);
-        let gap = |last: f64| libm::log(u - last).min(FAR).max(-FAR);
+        // What is out of order has no gap.
+        let gap = |last: f64| if u > last { libm::log(u - last).clamp(-FAR, FAR) } else { -FAR };
         out.push(last.map_or(u, gap));
         last = Some(u);
     }
