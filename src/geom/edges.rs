@@ -62,20 +62,18 @@ pub(super) fn build(positions: &[Vec3], triangles: &[[u32; 3]], parts: &[u16]) -
     Some(Mesh { positions: out_positions, normals: out_normals, topology: Arc::new(topology) })
 }
 
-/// A normal for each vertex of a surface without creases: the mean over the faces around its position, weighted by angle.
+/// A normal for each vertex of a surface without creases: the mean over the faces around it, weighted by area, which needs no
+/// angles and so is quick enough to be done for every shape of a body.
 pub(super) fn smooth_normals(positions: &[Vec3], triangles: &[[u32; 3]]) -> Vec<Vec3> {
-    let weld = weld(positions);
     let mut sums = vec![DVec3::ZERO; positions.len()];
     for t in triangles {
-        let w = t.map(|v| weld[v as usize]);
-        let p = w.map(|v| positions[v as usize].as_dvec3());
-        let Some(normal) = (p[1] - p[0]).cross(p[2] - p[0]).try_normalize() else { continue };
-        for c in 0..3 {
-            let along = |k: usize| (p[(c + k) % 3] - p[c]).normalize_or_zero();
-            sums[w[c] as usize] += normal * libm::acos(along(1).dot(along(2)).clamp(-1.0, 1.0));
+        let p = t.map(|v| positions[v as usize].as_dvec3());
+        let normal = (p[1] - p[0]).cross(p[2] - p[0]);
+        for v in t {
+            sums[*v as usize] += normal;
         }
     }
-    weld.iter().map(|w| sums[*w as usize].normalize_or(DVec3::Y).as_vec3()).collect()
+    sums.iter().map(|n| n.normalize_or(DVec3::Y).as_vec3()).collect()
 }
 
 /// For each vertex the first one at the same position.

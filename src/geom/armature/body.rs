@@ -5,7 +5,7 @@
 //! it. The surface is taken as smooth and closed: it has silhouettes, no creases, and no contour where parts meet.
 //! Single precision for vertices. Invariant: the meshes of a pose do not depend on the poses asked for before.
 
-use super::morph::Morph;
+use super::morph::{Anchor, Morph};
 use super::recent;
 use super::{JointPose, Rig, Rules};
 use crate::geom::{GeomError, Landmark, Mesh, Solid, Topology, edges};
@@ -44,6 +44,8 @@ struct Skin {
     influences: Vec<Influence>,
     parts: Vec<Part>,
     morphs: Vec<Morph>,
+    /// What each keypoint follows.
+    anchors: Vec<Anchor>,
 }
 
 /// A rig and its mesh.
@@ -97,7 +99,8 @@ impl Armature {
         }
         let parts = parts(rig.joints().len(), &triangles, &influences);
         let normals = edges::smooth_normals(&positions, &triangles);
-        let skin = Arc::new(Skin { triangles, influences, parts, morphs: Vec::new() });
+        let anchors = rig.keypoints().iter().map(|k| Anchor::of(k, &rig, &positions)).collect();
+        let skin = Arc::new(Skin { triangles, influences, parts, morphs: Vec::new(), anchors });
         Ok(Armature { rig, positions, normals, skin })
     }
 
@@ -162,8 +165,8 @@ impl Armature {
                 return Err(GeomError::domain(format!("the amount of the morph `{name}` must be finite")));
             }
             m.add(*amount, &mut positions, &mut heads, &mut tails);
-            for (d, k) in points.iter_mut().zip(self.rig.keypoints()) {
-                *d += m.at_keypoint(&self.rig, &self.positions, k) * *amount;
+            for (d, anchor) in points.iter_mut().zip(&self.skin.anchors) {
+                *d += m.at(*anchor) * *amount;
             }
         }
         let normals = edges::smooth_normals(&positions, &self.skin.triangles);

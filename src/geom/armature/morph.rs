@@ -41,16 +41,31 @@ impl Morph {
         }
     }
 
-    /// The offset of a keypoint: its joint's where it sits on the head, else that of the nearest vertex.
-    pub(super) fn at_keypoint(&self, rig: &Rig, positions: &[Vec3], k: &Keypoint) -> DVec3 {
-        let head = rig.joints().get(k.joint).map_or(DVec3::INFINITY, |j| j.head);
-        if (head - k.rest).length() < 1e-4 {
-            return self.heads.get(k.joint).copied().unwrap_or_default();
+    /// The offset of a keypoint.
+    pub(super) fn at(&self, anchor: Anchor) -> DVec3 {
+        match anchor {
+            Anchor::Head(j) => self.heads.get(j).copied().unwrap_or_default(),
+            Anchor::Vertex(v) => self.vertices.get(v).map_or(DVec3::ZERO, |d| d.as_dvec3()),
         }
-        let near = positions.iter().zip(&self.vertices).min_by(|(a, _), (b, _)| {
-            let d = |p: &Vec3| (p.as_dvec3() - k.rest).length_squared();
-            d(a).total_cmp(&d(b))
-        });
-        near.map_or(DVec3::ZERO, |(_, d)| d.as_dvec3())
+    }
+}
+
+/// What a keypoint follows when the shape changes.
+#[derive(Clone, Copy, Debug, PartialEq)]
+pub(super) enum Anchor {
+    /// The head of its joint, where it sits there.
+    Head(usize),
+    /// The nearest vertex.
+    Vertex(usize),
+}
+
+impl Anchor {
+    pub fn of(k: &Keypoint, rig: &Rig, positions: &[Vec3]) -> Anchor {
+        if rig.joints().get(k.joint).is_some_and(|j| (j.head - k.rest).length() < 1e-4) {
+            return Anchor::Head(k.joint);
+        }
+        let distance = |p: &Vec3| (p.as_dvec3() - k.rest).length_squared();
+        let near = positions.iter().enumerate().min_by(|(_, a), (_, b)| distance(a).total_cmp(&distance(b)));
+        Anchor::Vertex(near.map_or(0, |(v, _)| v))
     }
 }
