@@ -8,7 +8,8 @@ use super::landmark::{Landmark, unique};
 use super::mesh::{MOST_PARTS, MOST_TRIANGLES};
 use super::{Affine, Bounds, Edge, GeomError, Mesh, NO_FACE, Topology};
 use glam::DVec3;
-use std::sync::Arc;
+use std::fmt;
+use std::sync::{Arc, LazyLock};
 
 /// A placed mesh.
 #[derive(Clone, Debug)]
@@ -21,18 +22,34 @@ pub struct Instance {
     pub first_part: u16,
 }
 
+/// Meshes that are made when somebody first looks.
+type Lazy = LazyLock<Arc<[Instance]>, Box<dyn FnOnce() -> Arc<[Instance]> + Send>>;
+
 /// Placed meshes.
-#[derive(Clone, Debug)]
+#[derive(Clone)]
 pub struct Solid {
-    instances: Arc<[Instance]>,
+    instances: Arc<Lazy>,
     landmarks: Arc<[Landmark]>,
+}
+
+impl fmt::Debug for Solid {
+    fn fmt(&self, f: &mut fmt::Formatter<'_>) -> fmt::Result {
+        f.debug_struct("Solid").field("instances", &self.instances()).field("landmarks", &self.landmarks).finish()
+    }
+}
+
+/// A solid whose meshes are there already.
+fn ready(instances: Arc<[Instance]>) -> Arc<Lazy> {
+    let lazy: Lazy = LazyLock::new(Box::new(|| instances));
+    LazyLock::force(&lazy);
+    Arc::new(lazy)
 }
 
 impl Solid {
     /// A mesh as it is.
     pub fn new(mesh: Arc<Mesh>) -> Solid {
         let instance = Instance { mesh, affine: Affine::IDENTITY, first_part: 0 };
-        Solid { instances: Arc::new([instance]), landmarks: Arc::default() }
+        Solid { instances: ready(Arc::new([instance])), landmarks: Arc::default() }
     }
 
     /// The same with these named points in place of its own (world coordinates); a name that occurs again gets `#2`, `#3`, …
@@ -47,10 +64,15 @@ impl Solid {
         &self.landmarks
     }
 
-    /// Meshes as they are, each with the number of its first part.
-    pub fn of_parts(meshes: impl IntoIterator<Item = (Arc<Mesh>, u16)>) -> Solid {
+    /// Meshes as they are, each with the number of its first part; made when somebody first looks, which costs nothing where only
+    /// landmarks matter.
+    pub fn of_parts<M>(make: impl FnOnce() -> M + Send + 'static) -> Solid
+    where
+        M: IntoIterator<Item = (Arc<Mesh>, u16)>,
+    {
         let instance = |(mesh, first_part)| Instance { mesh, affine: Affine::IDENTITY, first_part };
-        Solid { instances: meshes.into_iter().map(instance).collect(), landmarks: Arc::default() }
+        let lazy: Lazy = LazyLock::new(Box::new(move || make().into_iter().map(instance).collect()));
+        Solid { instances: Arc::new(lazy), landmarks: Arc::default() }
     }
 
     /// Its meshes.
@@ -60,9 +82,10 @@ impl Solid {
 
     /// Moved by an affine map.
     pub fn placed(&self, by: Affine) -> Solid {
-        let instances = self.instances.iter().map(|i| Instance { affine: by * i.affine, ..i.clone() });
+        let of = Arc::clone(&self.instances);
+        let placed = move || of.iter().map(|i| Instance { affine: by * i.affine, ..i.clone() }).collect();
         let landmarks = self.landmarks.iter().map(|l| Landmark { position: by.point(l.position), ..l.clone() });
-        Solid { instances: instances.collect(), landmarks: landmarks.collect() }
+        Solid { instances: Arc::new(LazyLock::new(Box::new(placed))), landmarks: landmarks.collect() }
     }
 
     /// Several together; part numbers follow one another, and so do landmarks.
@@ -76,7 +99,7 @@ impl Solid {
             first = first.saturating_add(s.part_count());
         }
         let landmarks = solids.iter().flat_map(|s| s.landmarks.iter().cloned());
-        Solid { instances: instances.into(), landmarks: unique(landmarks) }
+        Solid { instances: ready(instances.into()), landmarks: unique(landmarks) }
     }
 
     /// The number of parts.

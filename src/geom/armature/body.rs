@@ -185,8 +185,11 @@ impl Armature {
         if !single.iter().all(|t| t.is_finite()) {
             return Err(GeomError::domain("the pose takes the body too far away"));
         }
-        let meshes = recent::meshes(self, &single);
-        let solid = Solid::of_parts(self.skin.parts.iter().zip(meshes).map(|(p, m)| (m, p.joint)));
+        let body = Arc::clone(self);
+        let solid = Solid::of_parts(move || {
+            let meshes = recent::meshes(&body, &single);
+            meshes.into_iter().enumerate().map(move |(i, m)| (m, body.skin.parts[i].joint))
+        });
         let landmarks: Vec<Landmark> = self
             .rig
             .keypoints()
