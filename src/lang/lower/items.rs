@@ -300,7 +300,7 @@ impl Lowerer<'_> {
             if let (true, Some(v)) = (args.is_empty(), data::without_file(kind)) {
                 return self.constant(v);
             }
-            let [arg] = &args[..] else {
+            let Some((arg, rest)) = args.split_first() else {
                 self.error(format!("{kind} takes one path"), e.span, "expected one string");
                 return self.nothing();
             };
@@ -309,7 +309,16 @@ impl Lowerer<'_> {
                     .hint_also("what a run reads must be known before it starts");
                 return self.nothing();
             };
-            return match (self.inputs.read)(kind, path, folder) {
+            let options = match data::Options::parse(kind, rest) {
+                Ok(options) => options,
+                Err((i, fault)) => {
+                    let span = rest.get(i).map_or(e.span, |a| a.value.span);
+                    let d = self.error(fault.message, span, "not an option");
+                    d.hints.extend(fault.hint);
+                    return self.nothing();
+                }
+            };
+            return match (self.inputs.read)(kind, path, folder, &options) {
                 Ok(v) => self.constant(v),
                 Err(f) => {
                     let d = self.error(f.message, arg.value.span, "cannot be read");
