@@ -12,8 +12,8 @@
 use crate::diag::{Diagnostic, IntoDiagnostic, Severity, SourceMap, render};
 use crate::infer::draws::Sink;
 use crate::infer::{ChainError, ChainResult, Progress, RunOptions, default_plan, run_chains};
-use crate::lang::builtins::scene::{CameraValue, DepthValue, ImageValue, KeypointsValue, MaskValue};
 use crate::lang::builtins::data::Options;
+use crate::lang::builtins::scene::{CameraValue, DepthValue, ImageValue, KeypointsValue, MaskValue};
 use crate::lang::builtins::{Table, data};
 use crate::lang::code::Code;
 use crate::lang::error::{Fault, FaultKind, RunError};

@@ -37,7 +37,8 @@ pub fn load_in(bytes: &[u8], frame: &FileFrame) -> Result<Mesh, GeomError> {
     for m in models.iter().filter(|m| !m.mesh.indices.is_empty()) {
         let part: u16 = m.name.parse().map_err(|e| unreadable(&e))?;
         let first = positions.len() as u32;
-        positions.extend(m.mesh.positions.chunks_exact(3).map(|p| frame.apply(Vec3::from_slice(p).as_dvec3()).as_vec3()));
+        positions
+            .extend(m.mesh.positions.chunks_exact(3).map(|p| frame.apply(Vec3::from_slice(p).as_dvec3()).as_vec3()));
         triangles.extend(m.mesh.indices.chunks_exact(3).map(|t| [t[0] + first, t[1] + first, t[2] + first]));
         parts.resize(triangles.len(), part);
     }

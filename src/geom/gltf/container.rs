@@ -91,7 +91,9 @@ pub(super) fn buffers<'a>(
             (None, Some(bin)) if i == 0 => Cow::Borrowed(bin),
             (None, _) => return Err(invalid(format!("buffer {i} of the glTF file names no file"))),
             (Some(uri), _) => Cow::Owned(match uri.strip_prefix("data:") {
-                Some(rest) => data(rest).ok_or_else(|| invalid(format!("buffer {i} of the glTF file is not base64")))?,
+                Some(rest) => {
+                    data(rest).ok_or_else(|| invalid(format!("buffer {i} of the glTF file is not base64")))?
+                }
                 None if uri.contains("://") => {
                     return Err(invalid(format!("buffer {i} of the glTF file is at {uri}: only files are read")));
                 }

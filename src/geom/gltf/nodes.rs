@@ -40,7 +40,10 @@ impl Nodes {
             at += 1;
         }
         if order.len() < nodes.len() {
-            return Err(GeomError::invalid(format!("the glTF file's nodes have a cycle: {}", cycle(&parents, &order, name))));
+            return Err(GeomError::invalid(format!(
+                "the glTF file's nodes have a cycle: {}",
+                cycle(&parents, &order, name)
+            )));
         }
         let mut drawn = vec![false; nodes.len()];
         match document.scenes.get(document.scene.unwrap_or(0)) {

@@ -22,7 +22,8 @@ pub(super) fn collect(
     let mut out = Loaded { rig, ..Loaded::default() };
     for (i, node) in data.document.nodes.iter().enumerate().filter(|(i, _)| nodes.drawn[*i]) {
         let Some(m) = node.mesh else { continue };
-        let missing = || GeomError::invalid(format!("node `{}` has the mesh {m}, which is not there", name_of(node, i)));
+        let missing =
+            || GeomError::invalid(format!("node `{}` has the mesh {m}, which is not there", name_of(node, i)));
         let mesh = data.document.meshes.get(m).ok_or_else(missing)?;
         let called = [&node.name, &mesh.name].into_iter().flatten().find(|s| !s.is_empty());
         let name = called.cloned().unwrap_or_else(|| format!("mesh_{m}"));
@@ -44,10 +45,9 @@ pub(super) fn collect(
                 }
                 (_, rig) => {
                     let carrier = skeleton.carrier[i].and_then(|j| rig.as_ref()?.placed(j));
-                    let whole = carrier.and_then(|j| u16::try_from(j).ok()).map(|j| Influence {
-                        joints: [j, 0, 0, 0],
-                        weights: [1.0, 0.0, 0.0, 0.0],
-                    });
+                    let whole = carrier
+                        .and_then(|j| u16::try_from(j).ok())
+                        .map(|j| Influence { joints: [j, 0, 0, 0], weights: [1.0, 0.0, 0.0, 0.0] });
                     out.influences.resize(out.positions.len(), whole);
                 }
             }

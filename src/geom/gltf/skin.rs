@@ -81,7 +81,8 @@ impl Skeleton {
             }
             let mut joints = Vec::with_capacity(skin.joints.len());
             for (j, bind) in skin.joints.iter().zip(&binds) {
-                let name = || format!("joint `{}` has an inverse bind matrix that has no inverse", name_of(&all[*j], *j));
+                let name =
+                    || format!("joint `{}` has an inverse bind matrix that has no inverse", name_of(&all[*j], *j));
                 let rest = to_scene * inverse(*bind, name)?;
                 joints.push(*number[*j].get_or_insert_with(|| {
                     out.nodes.push(*j);

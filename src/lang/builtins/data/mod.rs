@@ -9,7 +9,7 @@ mod csv;
 mod json;
 mod options;
 
-pub use options::Options;
+pub use options::{Options, has_options};
 
 use super::scene::{DepthValue, ImageValue, KeypointsValue, MaskValue, SolidValue};
 use super::{Arg, Args, Builtin, Type, arg, function, opt};
@@ -30,7 +30,8 @@ const FILE: &[Arg] = &[arg("file", Type::Str, "The path, relative to the program
 const SHAPE: &[Arg] = &[
     arg("file", Type::Str, "The path, relative to the program's folder."),
     opt("up", Type::Str, "\"y\"", "The file's axis that points up: \"x\", \"y\" or \"z\"; it is turned to +y."),
-    opt("unit", Type::Num, "1", "The length of the file's unit in scene units: 0.01 where it is centimetres.").unit("m"),
+    opt("unit", Type::Num, "1", "The length of the file's unit in scene units: 0.01 where it is centimetres.")
+        .unit("m"),
 ];
 
 const fn kind(name: &'static str, returns: Type, doc: &'static str) -> Builtin {

@@ -27,9 +27,12 @@ impl Options {
         for (i, a) in args.iter().enumerate() {
             let fault = |message: String| (i, Fault::type_error(message).with_hint(hint(kind)));
             let name = match &a.name {
-                Some(name) if takes(kind) => &*name.node,
+                Some(name) if has_options(kind) => &*name.node,
                 Some(name) => return Err(fault(format!("{kind} has no option `{}`", name.node))),
-                None => return Err(fault(format!("{kind} takes one path; options are given by name"))),
+                None if has_options(kind) => {
+                    return Err(fault(format!("{kind} takes one path; options are given by name")));
+                }
+                None => return Err(fault(format!("{kind} takes one path"))),
             };
             let again = match (name, &a.value.kind) {
                 ("up", ExprKind::Str(axis)) => {
@@ -50,18 +53,20 @@ impl Options {
                 return Err(fault(format!("`{name}` is given twice")));
             }
         }
+        // Only the unit can be refused.
         let at = args.iter().position(|a| a.name.as_ref().is_some_and(|n| &*n.node == "unit")).unwrap_or(0);
         let frame = FileFrame::new(up.unwrap_or_default(), unit.unwrap_or(1.0));
         frame.map(|frame| Options { frame }).map_err(|e| (at, Fault::type_error(e.to_string()).with_hint(hint(kind))))
     }
 }
 
-fn takes(kind: &str) -> bool {
+/// Whether data of a kind have options.
+pub fn has_options(kind: &str) -> bool {
     matches!(kind, "mesh" | "armature")
 }
 
 fn hint(kind: &str) -> String {
-    match takes(kind) {
+    match has_options(kind) {
         true => format!("for example {kind}(\"file.glb\", up = \"z\", unit = 0.01)"),
         false => format!("write {kind}(\"file\")"),
     }
