@@ -12,6 +12,7 @@
 use crate::diag::{Diagnostic, IntoDiagnostic, Severity, SourceMap, render};
 use crate::infer::draws::Sink;
 use crate::infer::{ChainError, ChainResult, Progress, RunOptions, default_plan, run_chains};
+use crate::lang::builtins::data::Options;
 use crate::lang::builtins::scene::{CameraValue, DepthValue, ImageValue, KeypointsValue, MaskValue};
 use crate::lang::builtins::{Table, data};
 use crate::lang::code::Code;
@@ -165,16 +166,17 @@ impl Program {
         self
     }
 
-    /// Reads a file for a `data` item as its declared kind.
+    /// Reads a file for a `data` item as its declared kind, with the options of its default.
     ///
     /// # Errors
     /// If the program has no such item, or the file cannot be read as that.
     pub fn observe_file(self, name: &str, path: &str) -> Result<Program, Error> {
-        let kind = self.interface().data.iter().find(|d| d.name == name).and_then(|d| d.ty.clone());
+        let item = self.interface().data.into_iter().find(|d| d.name == name);
+        let (kind, options) = item.map_or((None, Options::default()), |d| (d.ty, d.options));
         let kind = kind.unwrap_or_else(|| "image".into());
         let file = data::path_of(&kind, path);
         let loaded = match std::fs::read(file) {
-            Ok(bytes) => data::load(&kind, path, &bytes, &|other| sibling(&Disk, path, other)),
+            Ok(bytes) => data::load(&kind, path, &bytes, &options, &|other| sibling(&Disk, path, other)),
             Err(e) => Err(Fault::new(FaultKind::Other, format!("cannot read {file}: {}", reason(&e)))),
         };
         match loaded {
@@ -236,11 +238,11 @@ impl Program {
     pub fn compile(mut self) -> Result<Model, Error> {
         self.default_camera();
         let loader = &*self.loader;
-        let read_data = |kind: &str, path: &str, folder: &str| {
+        let read_data = |kind: &str, path: &str, folder: &str, options: &Options| {
             let beside = format!("{folder}{path}");
             let file = data::path_of(kind, &beside);
             match read(loader, file) {
-                Ok((bytes, _)) => data::load(kind, &beside, &bytes, &|other| sibling(loader, &beside, other)),
+                Ok((bytes, _)) => data::load(kind, &beside, &bytes, options, &|other| sibling(loader, &beside, other)),
                 Err(e) => Err(Fault::new(FaultKind::Other, format!("cannot read {file}: {}", reason(&e)))),
             }
         };

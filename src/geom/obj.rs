@@ -4,7 +4,7 @@
 //! Invariant: `tobj` sees only finite vertices and faces whose corners are there, so no bytes can make it stumble.
 
 use super::mesh::{MOST_PARTS, MOST_TRIANGLES};
-use super::{GeomError, Mesh};
+use super::{FileFrame, GeomError, Mesh};
 use glam::Vec3;
 use rustc_hash::FxHashMap;
 use std::fmt::Write;
@@ -20,6 +20,14 @@ const MOST_CORNERS: usize = 1000;
 /// not there before it, there are more than 65535 parts or five million triangles: with the number of the line. If there
 /// are no faces or none has an area.
 pub fn load(bytes: &[u8]) -> Result<Mesh, GeomError> {
+    load_in(bytes, &FileFrame::default())
+}
+
+/// Reads a mesh whose axes and unit are not the scene's; see [`load`].
+///
+/// # Errors
+/// As [`load`], and if a coordinate is not finite in the scene's unit.
+pub fn load_in(bytes: &[u8], frame: &FileFrame) -> Result<Mesh, GeomError> {
     let plain = plain(text(bytes)?)?;
     let options = tobj::LoadOptions { triangulate: true, ignore_points: true, ignore_lines: true, single_index: false };
     let no_materials = |_: &std::path::Path| Ok((Vec::new(), Default::default()));
@@ -29,7 +37,8 @@ pub fn load(bytes: &[u8]) -> Result<Mesh, GeomError> {
     for m in models.iter().filter(|m| !m.mesh.indices.is_empty()) {
         let part: u16 = m.name.parse().map_err(|e| unreadable(&e))?;
         let first = positions.len() as u32;
-        positions.extend(m.mesh.positions.chunks_exact(3).map(Vec3::from_slice));
+        positions
+            .extend(m.mesh.positions.chunks_exact(3).map(|p| frame.apply(Vec3::from_slice(p).as_dvec3()).as_vec3()));
         triangles.extend(m.mesh.indices.chunks_exact(3).map(|t| [t[0] + first, t[1] + first, t[2] + first]));
         parts.resize(triangles.len(), part);
     }

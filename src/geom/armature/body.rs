@@ -81,7 +81,10 @@ impl Armature {
         let mut influences = influences;
         for (v, i) in influences.iter_mut().enumerate() {
             let sum: f32 = i.weights.iter().sum();
-            if i.weights.iter().any(|w| !w.is_finite() || *w < 0.0) || (sum - 1.0).abs() > 1e-3 {
+            if let Some(w) = i.weights.iter().find(|w| !w.is_finite() || **w < 0.0) {
+                return Err(GeomError::invalid(format!("vertex {v} has a skin weight of {w}")));
+            }
+            if (sum - 1.0).abs() > 1e-3 {
                 return Err(GeomError::invalid(format!("the skin weights of vertex {v} sum to {sum}, not to 1")));
             }
             i.weights = i.weights.map(|w| w / sum);

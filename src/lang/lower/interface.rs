@@ -1,5 +1,6 @@
 //! What a program wants from outside: its parameters and data, without lowering it.
 
+use crate::lang::builtins::data::Options;
 use crate::lang::load::Loaded;
 use crate::syntax::ast::{ExprKind, ItemKind};
 use crate::syntax::print_expr;
@@ -26,6 +27,8 @@ pub struct DataItem {
     pub ty: Option<String>,
     /// Whether it has a default.
     pub has_default: bool,
+    /// How its default says that files are to be read; another file in its place is read alike.
+    pub options: Options,
     /// The help text.
     pub help: Option<String>,
 }
@@ -60,16 +63,19 @@ fn unit(loaded: &Loaded, index: usize, prefix: &str, found: &mut Interface) {
             }),
             ItemKind::Data(d) => {
                 let read = d.default.as_ref().and_then(|e| match &e.kind {
-                    ExprKind::Call { callee, .. } => match &callee.kind {
-                        ExprKind::Var(kind) => Some(kind.to_string()),
+                    ExprKind::Call { callee, args } => match &callee.kind {
+                        ExprKind::Var(kind) => Some((kind.to_string(), args.get(1..).unwrap_or_default())),
                         _ => None,
                     },
                     _ => None,
                 });
+                // What is wrong with options is said when the program is lowered.
+                let options = read.as_ref().and_then(|(kind, args)| Options::parse(kind, args).ok());
                 found.data.push(DataItem {
                     name: format!("{prefix}{}", d.name.node),
-                    ty: d.ty.as_ref().map(|t| t.node.to_string()).or(read),
+                    ty: d.ty.as_ref().map(|t| t.node.to_string()).or(read.map(|(kind, _)| kind)),
                     has_default: d.default.is_some(),
+                    options: options.unwrap_or_default(),
                     help: d.help.as_ref().map(|h| h.node.to_string()),
                 });
             }

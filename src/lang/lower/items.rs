@@ -275,7 +275,14 @@ impl Lowerer<'_> {
             }
         }
         let value = match (self.inputs.data.get(&*name).cloned(), &d.default) {
-            (Some(v), _) => {
+            (Some(v), default) => {
+                // The file was read with the default's options.
+                if let Some(ExprKind::Call { callee, args }) = default.as_ref().map(|e| &e.kind)
+                    && let ExprKind::Var(kind) = &callee.kind
+                    && data::kinds().any(|k| k == &**kind)
+                {
+                    self.options(kind, args.get(1..).unwrap_or_default());
+                }
                 self.used_data.push(name.to_string());
                 self.constant(v)
             }
@@ -300,7 +307,7 @@ impl Lowerer<'_> {
             if let (true, Some(v)) = (args.is_empty(), data::without_file(kind)) {
                 return self.constant(v);
             }
-            let [arg] = &args[..] else {
+            let Some((arg, rest)) = args.split_first() else {
                 self.error(format!("{kind} takes one path"), e.span, "expected one string");
                 return self.nothing();
             };
@@ -309,7 +316,8 @@ impl Lowerer<'_> {
                     .hint_also("what a run reads must be known before it starts");
                 return self.nothing();
             };
-            return match (self.inputs.read)(kind, path, folder) {
+            let Some(options) = self.options(kind, rest) else { return self.nothing() };
+            return match (self.inputs.read)(kind, path, folder, &options) {
                 Ok(v) => self.constant(v),
                 Err(f) => {
                     let d = self.error(f.message, arg.value.span, "cannot be read");
@@ -319,6 +327,19 @@ impl Lowerer<'_> {
             };
         }
         self.expr(e)
+    }
+
+    /// How a data item's file is to be read, from the arguments after its path.
+    fn options(&mut self, kind: &str, args: &[crate::syntax::ast::Arg]) -> Option<data::Options> {
+        let (i, fault) = match data::Options::parse(kind, args) {
+            Ok(options) => return Some(options),
+            Err(e) => e,
+        };
+        let span = args.get(i)?.value.span;
+        self.error(fault.message, span, if data::has_options(kind) { "not an option" } else { "not expected" })
+            .hints
+            .extend(fault.hint);
+        None
     }
 
     /// `--set` and `--observe` names that no file declares.

@@ -23,6 +23,7 @@ mod types;
 pub use interface::{DataItem, Interface, ParamItem, inspect};
 
 use super::builtins::Table;
+use super::builtins::data::Options;
 use super::code::{Block, BlockId, BlockKind, Code, Op, Operand, Slot};
 use super::error::Fault;
 use super::load::Loaded;
@@ -35,8 +36,8 @@ use rustc_hash::FxHashMap;
 use scope::{Body, Module, Scope};
 use std::sync::Arc;
 
-/// Reads a file of data: its kind (`image`, `csv`, …), its path as written, the folder of the program.
-pub type ReadData<'a> = &'a dyn Fn(&str, &str, &str) -> Result<Value, Fault>;
+/// Reads a file of data: its kind (`image`, `csv`, …), its path as written, the folder of the program, how it is to be read.
+pub type ReadData<'a> = &'a dyn Fn(&str, &str, &str, &Options) -> Result<Value, Fault>;
 
 /// What a program is given from outside.
 pub struct Inputs<'a> {

@@ -1,16 +1,28 @@
-//! Armatures: a rig file and what it names.
+//! Armatures: a rig file and what it names, or a glTF file with a skin.
 
-use super::Beside;
+use super::{Beside, Options};
 use crate::geom::GeomError;
 use crate::geom::armature::{Armature, morphs_from_json, rig_from_json};
-use crate::geom::obj;
+use crate::geom::{gltf, obj};
 use crate::lang::builtins::scene::ArmatureValue;
 use crate::lang::value::Value;
 use std::sync::Arc;
 
-/// Reads a rig, its mesh, and its morphs if it names some.
-pub(super) fn load(bytes: &[u8], beside: &Beside) -> Result<Value, String> {
+/// Reads a glTF file, or a rig, its mesh, and its morphs if it names some.
+pub(super) fn load(file: &str, bytes: &[u8], options: &Options, beside: &Beside) -> Result<Value, String> {
     let plain = |e: GeomError| e.to_string();
+    if gltf::is_gltf(file, bytes) {
+        let loaded = gltf::load(bytes, &options.frame(), beside).map_err(plain)?;
+        if loaded.rig.is_none() {
+            return Err("the glTF file has no skin, so nothing says which joint moves what; \
+                 read it with mesh(…) and let scene.autorig give it joints"
+                .into());
+        }
+        return Ok(Value::object(ArmatureValue(Arc::new(loaded.armature().map_err(plain)?))));
+    }
+    if *options != Options::default() {
+        return Err("`up` and `unit` are for glTF files; a rig file is in the scene's axes and units".into());
+    }
     let file = rig_from_json(bytes).map_err(plain)?;
     let within = |path: &str, e: GeomError| format!("{path}: {e}");
     let mesh = obj::indexed(&beside(&file.mesh)?).map_err(|e| within(&file.mesh, e))?;

@@ -7,10 +7,13 @@
 mod armature;
 mod csv;
 mod json;
+mod options;
+
+pub use options::{Options, has_options};
 
 use super::scene::{DepthValue, ImageValue, KeypointsValue, MaskValue, SolidValue};
 use super::{Arg, Args, Builtin, Type, arg, function, opt};
-use crate::geom::{Solid, obj};
+use crate::geom::{GeomError, Solid, gltf, obj};
 use crate::lang::error::{Fault, FaultKind};
 use crate::lang::value::Value;
 use crate::vision::keypoints::{self, Keypoints, People};
@@ -23,6 +26,13 @@ const SECTION: &str = "Data files";
 pub type Beside<'a> = dyn Fn(&str) -> Result<Vec<u8>, String> + 'a;
 
 const FILE: &[Arg] = &[arg("file", Type::Str, "The path, relative to the program's folder.")];
+
+const SHAPE: &[Arg] = &[
+    arg("file", Type::Str, "The path, relative to the program's folder."),
+    opt("up", Type::Str, "\"y\"", "The file's axis that points up: \"x\", \"y\" or \"z\"; it is turned to +y."),
+    opt("unit", Type::Num, "1", "The length of the file's unit in scene units: 0.01 where it is centimetres.")
+        .unit("m"),
+];
 
 const fn kind(name: &'static str, returns: Type, doc: &'static str) -> Builtin {
     function(name, SECTION, FILE, returns, doc, not_an_expression)
@@ -39,10 +49,13 @@ pub(super) const TABLE: &[Builtin] = &[
     kind("contours", Type::Object("an image"), "A ready contour map: bright pixels are contour."),
     kind("mask", Type::Object("a mask"), "A mask: bright pixels are the object."),
     kind("depth", Type::Object("a depth map"), "A depth map: `.npy`, or a 16-bit PNG in thousandths of a scene unit."),
-    kind(
+    function(
         "armature",
+        SECTION,
+        SHAPE,
         Type::Object("an armature"),
-        "A rig file, JSON, with the mesh and morphs it names beside it: see `docs/bodies.md`.",
+        "A body: a glTF file (`.glb`, `.gltf`) with a skin, or a rig file, JSON, with the mesh and morphs it names beside it: see `docs/bodies.md`. `up` and `unit` are for glTF.",
+        not_an_expression,
     ),
     function(
         "keypoints",
@@ -57,7 +70,14 @@ pub(super) const TABLE: &[Builtin] = &[
         "The joints of a person that a pose detector found, JSON in its own layout, COCO's or MediaPipe's; none without a file.",
         not_an_expression,
     ),
-    kind("mesh", Type::Object("a solid"), "A Wavefront OBJ mesh; each object or group in it is a part."),
+    function(
+        "mesh",
+        SECTION,
+        SHAPE,
+        Type::Object("a solid"),
+        "A Wavefront OBJ mesh, each object or group in it a part, or the default scene of a glTF file (`.glb`, `.gltf`), each node with a mesh a part.",
+        not_an_expression,
+    ),
 ];
 
 fn not_an_expression(a: &Args) -> Result<Value, Fault> {
@@ -96,11 +116,11 @@ pub fn load_keypoints(file: &str, bytes: &[u8], picture: Option<&str>) -> Result
 }
 
 /// Reads data of a kind from the bytes of a file; `file` is what messages call it, and `beside` reads files by paths relative
-/// to it.
+/// to it. Options are those of the item's default call.
 ///
 /// # Errors
 /// An unknown kind, or bytes that are not of that kind: a message with the line where there are lines.
-pub fn load(kind: &str, file: &str, bytes: &[u8], beside: &Beside) -> Result<Value, Fault> {
+pub fn load(kind: &str, file: &str, bytes: &[u8], options: &Options, beside: &Beside) -> Result<Value, Fault> {
     let limits = Limits::default();
     let text = |e: VisionError| e.to_string();
     let loaded = match kind {
@@ -117,10 +137,15 @@ pub fn load(kind: &str, file: &str, bytes: &[u8], beside: &Beside) -> Result<Val
             let scale = if npy::is_npy(bytes) { 1.0 } else { 1000.0 };
             depth::decode(bytes, scale, &limits).map(|d| Value::object(DepthValue::new(d))).map_err(text)
         }
-        "armature" => armature::load(bytes, beside),
+        "armature" => armature::load(file, bytes, options, beside),
         "keypoints" => return load_keypoints(file, bytes, None),
         "mesh" => {
-            obj::load(bytes).map(|m| Value::object(SolidValue(Solid::new(Arc::new(m))))).map_err(|e| e.to_string())
+            let mesh = if gltf::is_gltf(file, bytes) {
+                gltf::load(bytes, &options.frame(), beside).and_then(gltf::Loaded::mesh)
+            } else {
+                obj::load_in(bytes, &options.frame())
+            };
+            mesh.map(|m| Value::object(SolidValue(Solid::new(Arc::new(m))))).map_err(|e: GeomError| e.to_string())
         }
         _ => {
             let fault = Fault::type_error(format!("there is no data of type `{kind}`"));

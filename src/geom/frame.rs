@@ -1,0 +1,73 @@
+//! What a mesh file's axes and numbers mean: which axis points up, and how long its unit is.
+//!
+//! Only turns and scales; no mirrors. Invariant: the unit is positive and finite.
+
+use super::GeomError;
+use glam::DVec3;
+
+/// The axis of a file that points up.
+#[derive(Clone, Copy, Debug, Default, PartialEq, Eq)]
+pub enum UpAxis {
+    /// +x.
+    X,
+    /// +y, as here.
+    #[default]
+    Y,
+    /// +z.
+    Z,
+}
+
+/// How the coordinates of a file become the scene's.
+#[derive(Clone, Copy, Debug, PartialEq)]
+pub struct FileFrame {
+    up: UpAxis,
+    unit: f64,
+}
+
+impl Default for FileFrame {
+    fn default() -> FileFrame {
+        FileFrame { up: UpAxis::Y, unit: 1.0 }
+    }
+}
+
+impl FileFrame {
+    /// With this axis up, and a unit of so many scene units (metres).
+    ///
+    /// # Errors
+    /// A unit that is not a positive, finite number.
+    pub fn new(up: UpAxis, unit: f64) -> Result<FileFrame, GeomError> {
+        if unit > 0.0 && unit.is_finite() {
+            Ok(FileFrame { up, unit })
+        } else {
+            Err(GeomError::invalid(format!("the unit of a file must be a positive number of metres, got {unit}")))
+        }
+    }
+
+    /// A file's point in the scene. With z up, x stays and y points away from the viewer's +z; with x up, z stays.
+    pub fn apply(&self, p: DVec3) -> DVec3 {
+        let turned = match self.up {
+            UpAxis::X => DVec3::new(-p.y, p.x, p.z),
+            UpAxis::Y => p,
+            UpAxis::Z => DVec3::new(p.x, p.z, -p.y),
+        };
+        turned * self.unit
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    #[test]
+    fn up_becomes_y_and_hands_stay() {
+        for (up, axis) in [(UpAxis::X, DVec3::X), (UpAxis::Y, DVec3::Y), (UpAxis::Z, DVec3::Z)] {
+            let f = FileFrame::new(up, 0.5).unwrap();
+            assert_eq!(f.apply(axis), DVec3::Y * 0.5);
+            let [x, y, z] = DVec3::AXES.map(|a| f.apply(a) * 2.0);
+            assert_eq!(x.cross(y), z, "right-handed");
+        }
+        for unit in [0.0, -1.0, f64::NAN, f64::INFINITY] {
+            assert!(FileFrame::new(UpAxis::Y, unit).is_err());
+        }
+    }
+}

@@ -1,0 +1,192 @@
+//! The outside of a glTF file: the chunks of a GLB, and buffers within it, beside it, or in `data:` addresses.
+
+use super::json::{Document, Node};
+use crate::geom::GeomError;
+use std::borrow::Cow;
+
+/// Reads a file named relative to the glTF file, or says why not.
+pub type Read<'a> = dyn Fn(&str) -> Result<Vec<u8>, String> + 'a;
+
+/// The most buffers of a file.
+const MOST_BUFFERS: usize = 1024;
+/// Extensions that a file may require without their changing its triangles.
+const HARMLESS: [&str; 7] =
+    ["KHR_materials", "KHR_texture", "EXT_texture", "MSFT_texture", "KHR_lights", "KHR_mesh_quantization", "KHR_xmp"];
+
+fn invalid(message: impl Into<String>) -> GeomError {
+    GeomError::invalid(message)
+}
+
+/// Whether bytes are those of a glTF file: a GLB, or JSON with the key `asset`, or what is called `.gltf` or `.glb`.
+pub fn is_gltf(file: &str, bytes: &[u8]) -> bool {
+    #[derive(serde::Deserialize)]
+    struct Head {
+        asset: Option<serde::de::IgnoredAny>,
+    }
+    let ending = file.rsplit('.').next().unwrap_or_default().to_ascii_lowercase();
+    bytes.starts_with(b"glTF")
+        || matches!(&*ending, "gltf" | "glb")
+        || serde_json::from_slice::<Head>(bytes).is_ok_and(|h| h.asset.is_some())
+}
+
+fn word(bytes: &[u8], at: usize) -> Option<usize> {
+    let four: [u8; 4] = bytes.get(at..at.checked_add(4)?)?.try_into().ok()?;
+    usize::try_from(u32::from_le_bytes(four)).ok()
+}
+
+/// The document, and the chunk of bytes that follows it in a GLB.
+pub(super) fn open(bytes: &[u8]) -> Result<(Document, Option<&[u8]>), GeomError> {
+    let (text, bin) = if bytes.starts_with(b"glTF") { chunks(bytes)? } else { (bytes, None) };
+    let text = text.strip_prefix(b"\xef\xbb\xbf").unwrap_or(text);
+    let document: Document =
+        serde_json::from_slice(text).map_err(|e| invalid(format!("the glTF file cannot be read: {e}")))?;
+    let version = &document.asset.version;
+    if !version.starts_with("2.") {
+        return Err(invalid(format!("glTF of version 2 can be read, not {version}")));
+    }
+    match document.extensions_required.iter().find(|x| !HARMLESS.iter().any(|h| x.starts_with(h))) {
+        None => Ok((document, bin)),
+        Some(x) if x.contains("compression") => {
+            Err(invalid(format!("the glTF file is compressed ({x}), which cannot be read; export it without")))
+        }
+        Some(x) => Err(invalid(format!("the glTF file requires the extension {x}, which cannot be read"))),
+    }
+}
+
+fn chunks(bytes: &[u8]) -> Result<(&[u8], Option<&[u8]>), GeomError> {
+    let short = || invalid("the GLB file is cut short");
+    let version = word(bytes, 4).ok_or_else(short)?;
+    if version != 2 {
+        return Err(invalid(format!("GLB of version 2 can be read, not {version}")));
+    }
+    let bytes = bytes.get(..word(bytes, 8).ok_or_else(short)?).ok_or_else(short)?;
+    let chunk = |at: usize| -> Option<(&[u8], &[u8], usize)> {
+        let end = at.checked_add(8)?.checked_add(word(bytes, at)?)?;
+        Some((bytes.get(at + 4..at + 8)?, bytes.get(at + 8..end)?, end))
+    };
+    let (kind, text, end) = chunk(12).ok_or_else(short)?;
+    if kind != b"JSON" {
+        return Err(invalid("the GLB file does not start with a chunk of JSON"));
+    }
+    if end >= bytes.len() {
+        return Ok((text, None));
+    }
+    let (kind, bin, _) = chunk(end).ok_or_else(short)?;
+    Ok((text, (kind == b"BIN\0").then_some(bin)))
+}
+
+/// The contents of every buffer, each as long as it says.
+pub(super) fn buffers<'a>(
+    document: &Document,
+    bin: Option<&'a [u8]>,
+    read: &Read,
+) -> Result<Vec<Cow<'a, [u8]>>, GeomError> {
+    let count = document.buffers.len();
+    if count > MOST_BUFFERS {
+        return Err(invalid(format!("a glTF file of {count} buffers; at most {MOST_BUFFERS}")));
+    }
+    let mut all = Vec::with_capacity(count);
+    for (i, b) in document.buffers.iter().enumerate() {
+        let bytes: Cow<[u8]> = match (&b.uri, bin) {
+            (None, Some(bin)) if i == 0 => Cow::Borrowed(bin),
+            (None, _) => return Err(invalid(format!("buffer {i} of the glTF file names no file"))),
+            (Some(uri), _) => Cow::Owned(match uri.strip_prefix("data:") {
+                Some(rest) => {
+                    data(rest).ok_or_else(|| invalid(format!("buffer {i} of the glTF file is not base64")))?
+                }
+                None if uri.contains("://") => {
+                    return Err(invalid(format!("buffer {i} of the glTF file is at {uri}: only files are read")));
+                }
+                None => read(&unescaped(uri)).map_err(invalid)?,
+            }),
+        };
+        if bytes.len() < b.byte_length {
+            let (has, says) = (bytes.len(), b.byte_length);
+            return Err(invalid(format!("buffer {i} of the glTF file has {has} bytes, not {says} as it says")));
+        }
+        all.push(bytes);
+    }
+    Ok(all)
+}
+
+/// What follows `data:`.
+fn data(rest: &str) -> Option<Vec<u8>> {
+    let (kind, text) = rest.split_once(',')?;
+    if kind.ends_with(";base64") { base64(text) } else { None }
+}
+
+/// RFC 4648, section 4; padding may be left out.
+fn base64(text: &str) -> Option<Vec<u8>> {
+    let text = text.trim_end_matches('=');
+    let mut out = Vec::with_capacity(text.len() / 4 * 3 + 3);
+    let (mut bits, mut have) = (0u32, 0);
+    for c in text.bytes() {
+        let six = match c {
+            b'A'..=b'Z' => c - b'A',
+            b'a'..=b'z' => c - b'a' + 26,
+            b'0'..=b'9' => c - b'0' + 52,
+            b'+' => 62,
+            b'/' => 63,
+            _ => return None,
+        };
+        (bits, have) = (bits << 6 | u32::from(six), have + 6);
+        if have >= 8 {
+            have -= 8;
+            out.push((bits >> have) as u8);
+            bits &= (1 << have) - 1;
+        }
+    }
+    (text.len() % 4 != 1).then_some(out)
+}
+
+/// A path without `%20` and the like.
+fn unescaped(uri: &str) -> String {
+    let (bytes, mut out, mut i) = (uri.as_bytes(), Vec::with_capacity(uri.len()), 0);
+    while let Some(c) = bytes.get(i) {
+        let hex = bytes.get(i + 1..i + 3).and_then(|h| std::str::from_utf8(h).ok());
+        match hex.and_then(|h| u8::from_str_radix(h, 16).ok()) {
+            Some(x) if *c == b'%' => {
+                out.push(x);
+                i += 3;
+            }
+            _ => {
+                out.push(*c);
+                i += 1;
+            }
+        }
+    }
+    String::from_utf8(out).unwrap_or_else(|_| uri.to_owned())
+}
+
+/// What messages call a node.
+pub(super) fn name_of(node: &Node, number: usize) -> String {
+    match &node.name {
+        Some(name) if !name.is_empty() => name.clone(),
+        _ => format!("node_{number}"),
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    #[test]
+    fn base64_as_in_the_rfc() {
+        let known = ["", "f", "fo", "foo", "foob", "fooba", "foobar"];
+        let coded = ["", "Zg==", "Zm8=", "Zm9v", "Zm9vYg==", "Zm9vYmE=", "Zm9vYmFy"];
+        for (k, c) in known.iter().zip(coded) {
+            assert_eq!(base64(c).as_deref(), Some(k.as_bytes()));
+        }
+        assert_eq!((base64("Zm9v!"), base64("Zm9vY")), (None, None));
+        assert_eq!(base64("+/+/").as_deref(), Some(&[0xfb, 0xff, 0xbf][..]));
+        assert_eq!(unescaped("a%20b%2.bin%"), "a b%2.bin%");
+    }
+
+    #[test]
+    fn files_are_told_apart() {
+        assert!(is_gltf("a", b"glTF"));
+        assert!(is_gltf("a.json", br#" {"scene": 0, "asset": {"version": "2.0"}}"#));
+        assert!(is_gltf("a.GLB", b"") && is_gltf("a.gltf", b"{"));
+        assert!(!is_gltf("a.rig.json", br#"{"mesh": "a.obj", "joints": []}"#) && !is_gltf("gl.obj", b"v 0 0 0"));
+    }
+}

@@ -1,0 +1,90 @@
+//! Reading glTF 2.0 (Khronos, glTF 2.0 specification): the triangles of the default scene, and skins as a rig.
+//!
+//! `.glb` and `.gltf`, with buffers inside, beside, or in `data:` addresses. Materials, the file's own normals, cameras,
+//! animations and morph targets are not read; sparse accessors and compressed meshes are refused. Invariant: every index is
+//! checked before it is used, so no bytes can make it stumble.
+
+mod access;
+mod container;
+mod json;
+mod nodes;
+mod shapes;
+mod skin;
+
+pub use container::{Read, is_gltf};
+
+use super::armature::{Armature, Influence, Rig};
+use super::{FileFrame, GeomError, Mesh};
+use glam::Vec3;
+use rustc_hash::FxHashMap;
+
+/// What a glTF file's scene holds, in scene units, +y up; bodies are in their bind pose.
+#[derive(Clone, Debug, Default, PartialEq)]
+pub struct Loaded {
+    /// The vertices.
+    pub positions: Vec<Vec3>,
+    /// The triangles, counter-clockwise seen from outside.
+    pub triangles: Vec<[u32; 3]>,
+    /// The part of each triangle.
+    pub parts: Vec<u16>,
+    /// The names of the parts: of their nodes, or else their meshes.
+    pub names: Vec<String>,
+    /// The joints, if a mesh has a skin, each with a keypoint of its name at its head.
+    pub rig: Option<Rig>,
+    /// By vertex: what moves it. A vertex of a mesh that neither has a skin nor hangs on a joint has none.
+    pub influences: Vec<Option<Influence>>,
+}
+
+/// Reads a file; `read` reads those that it names, by paths relative to it.
+///
+/// # Errors
+/// [`GeomError::Invalid`]: bytes that are not glTF 2.0, or less than they say; what cannot be read (see above); nodes that
+/// form no tree; references and vertex numbers to what is not there; places that are not finite; a skin without weights; more
+/// than five million triangles, 65535 meshes or 4096 joints; no triangles.
+pub fn load(bytes: &[u8], frame: &FileFrame, read: &Read) -> Result<Loaded, GeomError> {
+    let (document, bin) = container::open(bytes)?;
+    let data = access::Data::new(&document, bin, read)?;
+    let nodes = nodes::Nodes::of(&document)?;
+    let skeleton = skin::Skeleton::of(&data, &nodes)?;
+    let rig = skeleton.rig(&data, &nodes, frame)?;
+    shapes::collect(&data, &nodes, &skeleton, rig, frame)
+}
+
+impl Loaded {
+    /// All of it as a mesh, as it stands.
+    ///
+    /// # Errors
+    /// As [`Mesh::new`]: no triangle with an area.
+    pub fn mesh(self) -> Result<Mesh, GeomError> {
+        Mesh::new(self.positions, self.triangles, self.parts)
+    }
+
+    /// What the joints move, as a body; other meshes are left out. Vertices that differ in nothing that is read, but in
+    /// their texture or normal, are one.
+    ///
+    /// # Errors
+    /// No skin, and as [`Armature::new`]: weights that do not sum to 1.
+    pub fn armature(self) -> Result<Armature, GeomError> {
+        let Some(rig) = self.rig else {
+            return Err(GeomError::invalid("the glTF file has no skin, so nothing says which joint moves what"));
+        };
+        let mut known: FxHashMap<([u32; 3], [u16; 4], [u32; 4]), u32> = FxHashMap::default();
+        let (mut positions, mut influences) = (Vec::new(), Vec::new());
+        let mut number = vec![None; self.positions.len()];
+        for ((p, i), n) in self.positions.iter().zip(&self.influences).zip(&mut number) {
+            let Some(i) = i else { continue };
+            // Zeros of either sign are one place.
+            let place = (*p + Vec3::ZERO).to_array().map(f32::to_bits);
+            let key = (place, i.joints, i.weights.map(f32::to_bits));
+            *n = Some(*known.entry(key).or_insert_with(|| {
+                positions.push(*p);
+                influences.push(*i);
+                positions.len() as u32 - 1
+            }));
+        }
+        let number = |v: u32| number.get(v as usize).copied().flatten();
+        let triangle = |t: &[u32; 3]| Some([number(t[0])?, number(t[1])?, number(t[2])?]);
+        let triangles: Vec<[u32; 3]> = self.triangles.iter().filter_map(triangle).collect();
+        Armature::new(rig, positions, triangles, influences)
+    }
+}

@@ -1,0 +1,216 @@
+//! Skins: which nodes are joints, where they are at rest, and what moves each vertex.
+//!
+//! Rest is the bind pose. A skin's vertices and joints are brought to the scene by its root joint: global transform times
+//! inverse bind matrix, which is the same for all joints of a file whose nodes stand in the bind pose, and most often the
+//! identity. glTF moves a vertex by the sum of `w_j G_j B_j`; with `G_j` at rest `A B_j^-1` that is [`Rig`]'s own rule about
+//! the heads `A B_j^-1 0`, so rest frames can be the world's.
+
+use super::access::{Data, F32, U8, U16};
+use super::container::name_of;
+use super::json::Primitive;
+use super::nodes::Nodes;
+use crate::geom::armature::{Influence, MOST_WEIGHTS, NamedJoint, Rig};
+use crate::geom::{FileFrame, GeomError};
+use glam::{DAffine3, DMat4, DVec3};
+use std::collections::{BTreeMap, BTreeSet};
+
+/// How near to the identity a skin's placement is taken for it: what single precision leaves of the product.
+const SAME: f64 = 1e-5;
+
+/// One skin that the scene uses.
+pub(super) struct Placed {
+    /// From the space of its vertices to the scene's.
+    pub to_scene: DAffine3,
+    /// Its joints, by number in the skeleton.
+    joints: Vec<usize>,
+}
+
+/// The joints of all skins that the scene uses.
+#[derive(Default)]
+pub(super) struct Skeleton {
+    /// Their nodes.
+    nodes: Vec<usize>,
+    /// From each joint's space to the scene's, at rest.
+    rest: Vec<DAffine3>,
+    /// By number in the file.
+    pub skins: BTreeMap<usize, Placed>,
+    /// By node: the joint that carries it, itself or the nearest above.
+    pub carrier: Vec<Option<usize>>,
+}
+
+fn inverse(m: DAffine3, what: impl Fn() -> String) -> Result<DAffine3, GeomError> {
+    let inverse = m.inverse();
+    let det = m.matrix3.determinant();
+    if det != 0.0 && det.is_finite() && inverse.is_finite() { Ok(inverse) } else { Err(GeomError::invalid(what())) }
+}
+
+impl Skeleton {
+    pub fn of(data: &Data, nodes: &Nodes) -> Result<Skeleton, GeomError> {
+        let all = &data.document.nodes;
+        let used = all.iter().zip(&nodes.drawn).filter(|(n, d)| **d && n.mesh.is_some()).filter_map(|(n, _)| n.skin);
+        let used: BTreeSet<usize> = used.collect();
+        let mut out = Skeleton { carrier: vec![None; all.len()], ..Skeleton::default() };
+        let mut rank = vec![0; all.len()];
+        nodes.order.iter().enumerate().for_each(|(k, i)| rank[*i] = k);
+        let mut number = vec![None; all.len()];
+        for s in used {
+            let missing = || GeomError::invalid(format!("the glTF file has no skin {s}"));
+            let skin = data.document.skins.get(s).ok_or_else(missing)?;
+            if let Some(j) = skin.joints.iter().find(|j| **j >= all.len()) {
+                return Err(GeomError::invalid(format!("skin {s} has the node {j} as a joint, which is not there")));
+            }
+            let Some((first, root)) = skin.joints.iter().copied().enumerate().min_by_key(|(_, j)| rank[*j]) else {
+                return Err(GeomError::invalid(format!("skin {s} of the glTF file has no joints")));
+            };
+            let binds = match skin.inverse_bind_matrices {
+                None => vec![DAffine3::IDENTITY; skin.joints.len()],
+                Some(a) => {
+                    let e = data.elements(a, "MAT4", &[F32])?;
+                    let (has, needs) = (e.count, skin.joints.len());
+                    if has < needs {
+                        let message = format!("skin {s} has {needs} joints, but {has} inverse bind matrices");
+                        return Err(GeomError::invalid(message));
+                    }
+                    let one = |i| DMat4::from_cols_array(&std::array::from_fn(|k| e.get(i, k)));
+                    (0..needs).map(|i| DAffine3::from_mat4(one(i))).collect()
+                }
+            };
+            let mut to_scene = nodes.global[root] * binds[first];
+            if to_scene.abs_diff_eq(DAffine3::IDENTITY, SAME) {
+                to_scene = DAffine3::IDENTITY;
+            }
+            let mut joints = Vec::with_capacity(skin.joints.len());
+            for (j, bind) in skin.joints.iter().zip(&binds) {
+                let name =
+                    || format!("joint `{}` has an inverse bind matrix that has no inverse", name_of(&all[*j], *j));
+                let rest = to_scene * inverse(*bind, name)?;
+                joints.push(*number[*j].get_or_insert_with(|| {
+                    out.nodes.push(*j);
+                    out.rest.push(rest);
+                    out.nodes.len() - 1
+                }));
+            }
+            out.skins.insert(s, Placed { to_scene, joints });
+        }
+        for i in &nodes.order {
+            out.carrier[*i] = number[*i].or_else(|| nodes.parents[*i].and_then(|p| out.carrier[p]));
+        }
+        Ok(out)
+    }
+
+    /// Where a mesh without a skin is at rest: with the joint that carries it, or where its node is.
+    pub fn place(&self, data: &Data, nodes: &Nodes, node: usize) -> Result<DAffine3, GeomError> {
+        let global = nodes.global[node];
+        let Some(j) = self.carrier[node] else { return Ok(global) };
+        let joint = self.nodes[j];
+        let name = || format!("the node `{}` has no volume", name_of(&data.document.nodes[joint], joint));
+        Ok(self.rest[j] * (inverse(nodes.global[joint], name)? * global))
+    }
+
+    /// The rig, with a keypoint at each joint's head; none without joints.
+    pub fn rig(&self, data: &Data, nodes: &Nodes, frame: &FileFrame) -> Result<Option<Rig>, GeomError> {
+        if self.nodes.is_empty() {
+            return Ok(None);
+        }
+        let names = self.names(data);
+        let parent: Vec<Option<usize>> =
+            self.nodes.iter().map(|n| nodes.parents[*n].and_then(|p| self.carrier[p])).collect();
+        let heads: Vec<DVec3> = self.rest.iter().map(|r| frame.apply(r.translation)).collect();
+        let mut below = vec![(DVec3::ZERO, 0u32); heads.len()];
+        for (p, h) in parent.iter().zip(&heads) {
+            if let Some(p) = p {
+                below[*p] = (below[*p].0 + *h, below[*p].1 + 1);
+            }
+        }
+        let tail = |j: usize| match (below[j], parent[j]) {
+            ((sum, n @ 1..), _) => sum / f64::from(n),
+            // A bone that nothing hangs on goes on as its parent's does, half as long.
+            (_, Some(p)) => heads[j] + (heads[j] - heads[p]) * 0.5,
+            _ => heads[j],
+        };
+        let joint = |j: usize| NamedJoint {
+            name: names[j].clone(),
+            parent: parent[j].map(|p| names[p].clone()),
+            head: heads[j],
+            tail: tail(j),
+        };
+        let rig = Rig::new((0..heads.len()).map(joint).collect())?;
+        let points = names.iter().zip(&heads).map(|(n, h)| (n.clone(), n.clone(), *h));
+        rig.with_keypoints(points.collect()).map(Some)
+    }
+
+    /// Names without two of a kind.
+    fn names(&self, data: &Data) -> Vec<String> {
+        let given = |n: usize| data.document.nodes[n].name.clone().filter(|s| !s.is_empty());
+        let mut taken: BTreeSet<String> = self.nodes.iter().filter_map(|n| given(*n)).collect();
+        let (mut counts, mut names) = (BTreeMap::new(), Vec::with_capacity(self.nodes.len()));
+        for (j, n) in self.nodes.iter().enumerate() {
+            let base = given(*n).unwrap_or_else(|| format!("joint_{j}"));
+            let count = counts.entry(base.clone()).or_insert(0u32);
+            *count += 1;
+            let mut name = base.clone();
+            if *count > 1 || (given(*n).is_none() && taken.contains(&base)) {
+                *count = (*count).max(2);
+                name = format!("{base}#{count}");
+                while taken.contains(&name) {
+                    *count += 1;
+                    name = format!("{base}#{count}");
+                }
+            }
+            taken.insert(name.clone());
+            names.push(name);
+        }
+        names
+    }
+}
+
+/// What moves each vertex of a primitive: the four that weigh most of `JOINTS_0` and `JOINTS_1`, in the rig's numbers.
+pub(super) fn influences(
+    data: &Data,
+    primitive: &Primitive,
+    what: &str,
+    vertices: usize,
+    skin: &Placed,
+    rig: &Rig,
+) -> Result<Vec<Influence>, GeomError> {
+    let mut sets = Vec::new();
+    for k in 0..2 {
+        let find = |name: &str| primitive.attributes.get(&format!("{name}_{k}")).copied();
+        match (find("JOINTS"), find("WEIGHTS")) {
+            (Some(j), Some(w)) => {
+                let set = (data.elements(j, "VEC4", &[U8, U16])?, data.elements(w, "VEC4", &[F32, U8, U16])?);
+                let (joints, weights) = (set.0.count, set.1.count);
+                if joints != vertices || weights != vertices {
+                    return Err(GeomError::invalid(format!(
+                        "{what} has {vertices} vertices, but joints for {joints} and weights for {weights}"
+                    )));
+                }
+                sets.push(set);
+            }
+            _ if k == 0 => {
+                return Err(GeomError::invalid(format!("{what} has a skin, but no weights (JOINTS_0 and WEIGHTS_0)")));
+            }
+            _ => break,
+        }
+    }
+    let one = |v: usize| {
+        let mut found = Vec::with_capacity(8);
+        for (joints, weights) in &sets {
+            found.extend((0..4).map(|k| (joints.whole(v, k), weights.get(v, k))).filter(|(_, w)| *w != 0.0));
+        }
+        found.sort_by(|a, b| b.1.total_cmp(&a.1));
+        found.truncate(MOST_WEIGHTS);
+        let sum: f64 = found.iter().map(|(_, w)| *w).sum();
+        let mut out = Influence::default();
+        for (k, (j, w)) in found.iter().enumerate() {
+            let placed = skin.joints.get(*j).and_then(|j| rig.placed(*j)).and_then(|j| u16::try_from(j).ok());
+            out.joints[k] = placed.ok_or_else(|| {
+                let n = skin.joints.len();
+                GeomError::invalid(format!("vertex {v} of {what} is moved by joint {j}, but its skin has {n} joints"))
+            })?;
+            out.weights[k] = (w / sum) as f32;
+        }
+        Ok(out)
+    };
+    (0..vertices).map(one).collect()
+}
