@@ -58,7 +58,8 @@ pub(super) fn build(positions: &[Vec3], triangles: &[[u32; 3]], parts: &[u16]) -
         .map(|(f, c, g, crease)| Edge { vertices: [out[f][c], out[f][(c + 1) % 3]], faces: [f as u32, g], crease })
         .collect();
     let part_count = kept_parts.iter().max().map_or(0, |p| p.saturating_add(1));
-    let topology = Topology { triangles: out, parts: kept_parts, part_count, edges, encloses: false };
+    let part_names = Vec::new();
+    let topology = Topology { triangles: out, parts: kept_parts, part_count, part_names, edges, encloses: false };
     Some(Mesh { positions: out_positions, normals: out_normals, topology: Arc::new(topology) })
 }
 
@@ -77,7 +78,7 @@ pub(super) fn smooth_normals(positions: &[Vec3], triangles: &[[u32; 3]]) -> Vec<
 }
 
 /// For each vertex the first one at the same position.
-fn weld(positions: &[Vec3]) -> Vec<u32> {
+pub(super) fn weld(positions: &[Vec3]) -> Vec<u32> {
     let mut first: FxHashMap<[u32; 3], u32> = FxHashMap::default();
     let key = |p: &Vec3| [p.x, p.y, p.z].map(|x| (x + 0.0).to_bits());
     positions.iter().enumerate().map(|(i, p)| *first.entry(key(p)).or_insert(i as u32)).collect()

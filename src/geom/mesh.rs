@@ -31,6 +31,8 @@ pub struct Topology {
     pub parts: Vec<u16>,
     /// The number of parts.
     pub part_count: u16,
+    /// The names of parts by number, where they have some: empty strings and those beyond the end have none.
+    pub part_names: Vec<Arc<str>>,
     /// Every edge once.
     pub edges: Vec<Edge>,
     /// Whether the faces are known to enclose a body without crossing each other: seen from outside, those that are turned

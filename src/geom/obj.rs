@@ -8,11 +8,13 @@ use super::{FileFrame, GeomError, Mesh};
 use glam::Vec3;
 use rustc_hash::FxHashMap;
 use std::fmt::Write;
+use std::sync::Arc;
 
 /// The most corners of a polygon.
 const MOST_CORNERS: usize = 1000;
 
-/// Reads a mesh; each object or group of the file is a part, numbered by first use, and one opened again goes on. Polygons
+/// Reads a mesh; each object or group of the file is a part with its name, numbered by first use, and one opened again goes
+/// on. Polygons
 /// are cut into triangles as fans. A fourth coordinate divides the others.
 ///
 /// # Errors
@@ -28,7 +30,7 @@ pub fn load(bytes: &[u8]) -> Result<Mesh, GeomError> {
 /// # Errors
 /// As [`load`], and if a coordinate is not finite in the scene's unit.
 pub fn load_in(bytes: &[u8], frame: &FileFrame) -> Result<Mesh, GeomError> {
-    let plain = plain(text(bytes)?)?;
+    let (plain, names) = plain(text(bytes)?)?;
     let options = tobj::LoadOptions { triangulate: true, ignore_points: true, ignore_lines: true, single_index: false };
     let no_materials = |_: &std::path::Path| Ok((Vec::new(), Default::default()));
     let unreadable = |e: &dyn std::fmt::Display| GeomError::invalid(format!("the OBJ file cannot be read: {e}"));
@@ -45,7 +47,9 @@ pub fn load_in(bytes: &[u8], frame: &FileFrame) -> Result<Mesh, GeomError> {
     if triangles.is_empty() {
         return Err(GeomError::invalid("the OBJ file has no faces"));
     }
-    Mesh::new(positions, triangles, parts)
+    let mut mesh = Mesh::new(positions, triangles, parts)?;
+    Arc::make_mut(&mut mesh.topology).part_names = names;
+    Ok(mesh)
 }
 
 /// Vertices and triangles as the file numbers them, with the name of each triangle's object or group.
@@ -57,6 +61,8 @@ pub struct Indexed {
     pub triangles: Vec<[u32; 3]>,
     /// The number of each triangle's object or group, by first use.
     pub parts: Vec<u16>,
+    /// Their names by number; empty where faces come before any object or group.
+    pub part_names: Vec<Arc<str>>,
 }
 
 /// Reads a mesh with the file's own numbers of vertices, which skin weights go by.
@@ -64,8 +70,8 @@ pub struct Indexed {
 /// # Errors
 /// As [`load`], but for triangles without area, which stay.
 pub fn indexed(bytes: &[u8]) -> Result<Indexed, GeomError> {
-    let plain = plain(text(bytes)?)?;
-    let (mut out, mut part) = (Indexed::default(), 0u16);
+    let (plain, names) = plain(text(bytes)?)?;
+    let (mut out, mut part) = (Indexed { part_names: names, ..Indexed::default() }, 0u16);
     for line in plain.lines() {
         let mut words = line.split(' ');
         // Only what `plain` wrote is here, so every word reads as a number.
@@ -97,8 +103,8 @@ fn text(bytes: &[u8]) -> Result<&str, GeomError> {
 }
 
 /// Checks a file, line by line, and keeps the vertices, the faces' vertex numbers counted from the start, and the parts,
-/// as `g` with a number.
-fn plain(text: &str) -> Result<String, GeomError> {
+/// as `g` with a number; and the names of the parts.
+fn plain(text: &str) -> Result<(String, Vec<Arc<str>>), GeomError> {
     let mut out = String::with_capacity(text.len());
     let (mut vertices, mut triangles) = (0i64, 0usize);
     let mut names: FxHashMap<&str, usize> = FxHashMap::default();
@@ -137,7 +143,12 @@ fn plain(text: &str) -> Result<String, GeomError> {
             _ => {}
         }
     }
-    Ok(out)
+    // By number, which is the order of insertion whatever that of the table is.
+    let mut by_number = vec![Arc::from(""); names.len()];
+    for (name, number) in names {
+        by_number[number] = Arc::from(name);
+    }
+    Ok((out, by_number))
 }
 
 /// The numbers after `v`: three coordinates, or four, or three and three of a colour.
@@ -260,6 +271,11 @@ mod tests {
         let text = "o a\nv 0 0 0\nv 1 0 0\nv 1 1 0\nv 0 1 0\nf 1 2 3 4\no b\nv 0 0 1\nf 1 2 5\n";
         let m = load(text.as_bytes()).unwrap();
         assert_eq!((m.topology.triangles.len(), m.topology.part_count), (3, 2));
+        assert_eq!(m.topology.part_names, ["a".into(), "b".into()]);
+        assert_eq!(indexed(text.as_bytes()).unwrap().part_names, m.topology.part_names);
+        let two = crate::geom::Solid::new(Arc::new(m));
+        let both = crate::geom::Solid::group(&[two.clone(), two]).to_mesh().unwrap();
+        assert_eq!(both.topology.part_names.iter().map(|n| &**n).collect::<Vec<_>>(), ["a", "b", "a", "b"]);
     }
 
     #[test]

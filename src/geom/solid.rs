@@ -158,13 +158,23 @@ impl Solid {
             }));
         }
         t.part_count = self.part_count();
+        for i in self.instances.iter() {
+            let first = usize::from(i.first_part);
+            for (k, name) in i.mesh.topology.part_names.iter().enumerate().filter(|(_, n)| !n.is_empty()) {
+                let at = (first + k).min(MOST_PARTS - 1);
+                t.part_names.resize(t.part_names.len().max(at + 1), Arc::from(""));
+                t.part_names[at] = Arc::clone(name);
+            }
+        }
         let whole = |face: &[u32; 3]| {
             let p = face.map(|v| positions[v as usize].as_dvec3());
             (p[1] - p[0]).cross(p[2] - p[0]).length_squared() > 0.0
         };
         // Also false where a coordinate is not finite, which `Mesh::new` then names.
         if t.triangles.is_empty() || !t.triangles.iter().all(whole) || !positions.iter().all(|p| p.is_finite()) {
-            return Mesh::new(positions, t.triangles, t.parts);
+            let mut mesh = Mesh::new(positions, t.triangles, t.parts)?;
+            Arc::make_mut(&mut mesh.topology).part_names = t.part_names;
+            return Ok(mesh);
         }
         Ok(Mesh { positions, normals, topology: Arc::new(t) })
     }

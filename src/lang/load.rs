@@ -49,6 +49,7 @@ pub const EMBEDDED: &[(&str, &str)] = &[
     ("human_kth.pcad", include_str!("../../programs/human_kth.pcad")),
     ("human_paper.pcad", include_str!("../../programs/human_paper.pcad")),
     ("two_people.pcad", include_str!("../../programs/two_people.pcad")),
+    ("autorig.pcad", include_str!("../../programs/autorig.pcad")),
     ("lathe.pcad", include_str!("../../programs/lathe.pcad")),
     ("lathe_paper.pcad", include_str!("../../programs/lathe_paper.pcad")),
     ("scene.pcad", include_str!("../../programs/scene.pcad")),
@@ -63,6 +64,7 @@ pub const EMBEDDED: &[(&str, &str)] = &[
     ("std/human/human.lod2.rig.json", include_str!("../../programs/std/human/human.lod2.rig.json")),
     ("std/human/human.lod2.morphs.json", include_str!("../../programs/std/human/human.lod2.morphs.json")),
     ("std/human/pose_prior.json", include_str!("../../programs/std/human/pose_prior.json")),
+    ("data/dog.obj", include_str!("../../programs/data/dog.obj")),
     ("data/line.csv", include_str!("../../programs/data/line.csv")),
     ("data/groups.csv", include_str!("../../programs/data/groups.csv")),
 ];

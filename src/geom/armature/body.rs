@@ -316,6 +316,7 @@ fn parts(joints: usize, triangles: &[[u32; 3]], influences: &[Influence]) -> Vec
             parts: vec![0; faces.len()],
             triangles: faces,
             part_count: 1,
+            part_names: Vec::new(),
             edges: Vec::new(),
             encloses: true,
         };

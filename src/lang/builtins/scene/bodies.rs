@@ -1,8 +1,8 @@
-//! Bodies: armatures in a shape and a pose.
+//! Bodies: armatures in a shape and a pose, and those made from a mesh.
 
 use super::shapes::vector_of;
 use super::{ARMATURE, AffineValue, ArmatureValue, SOLID, SolidValue, fault, native};
-use crate::geom::armature::{Armature, JointPose, Rules, Turn};
+use crate::geom::armature::{Armature, JointPose, Rules, Turn, autorig};
 use crate::lang::builtins::{Args, Builtin, Type, arg, opt};
 use crate::lang::error::Fault;
 use crate::lang::value::{Record, Value};
@@ -60,6 +60,38 @@ pub(super) const TABLE: &[Builtin] = &[
                 list.push((&**name, *x));
             }
             body.shaped(&list).map(|b| Value::object(ArmatureValue(Arc::new(b)))).map_err(fault)
+        },
+    ),
+    native(
+        "autorig",
+        SECTION,
+        &[
+            arg("mesh", SOLID, "The mesh, such as `data m: mesh` has it."),
+            opt(
+                "from",
+                Type::Str,
+                "\"groups\"",
+                "\"groups\": a joint for each object or group of the mesh, called as that is; \"skeleton\": \
+                 `root`, `bone_1`, … through the middle of a closed mesh.",
+            ),
+            opt("bones", Type::Int, "16", "The most joints of a skeleton, 1 to 256."),
+        ],
+        ARMATURE,
+        "An armature for a mesh that has none, a tree with the root at the mesh's centre; its joints are landmarks of what \
+         `scene.skin` makes of it. The surface becomes smooth. Made of data alone it is made once.",
+        |a| {
+            let solid = a.object::<SolidValue>(0, "a solid")?;
+            let mesh = solid.0.to_mesh().map_err(fault)?;
+            let most = if a.given(2) { a.int_in(2, 1, autorig::MOST_BONES as i64)? as usize } else { 16 };
+            let made = match a.choice(1, &["groups", "skeleton"])? {
+                "skeleton" => autorig::by_skeleton(&mesh, most).map_err(fault),
+                _ => autorig::by_groups(&mesh).map_err(|e| {
+                    let one = mesh.topology.parts.windows(2).all(|p| p[0] == p[1]);
+                    let f = fault(e);
+                    if one { f.with_hint("for a mesh of one piece there is `from = \"skeleton\"`") } else { f }
+                }),
+            };
+            made.map(|b| Value::object(ArmatureValue(Arc::new(b))))
         },
     ),
 ];
