@@ -1,3 +1,5 @@
+//! Tests of kinematics: exact cases, continuity, and derivatives against differences.
+
 use super::super::rig::NamedJoint;
 use super::super::{Turn, rig::Rig};
 use super::*;
