@@ -86,17 +86,28 @@ fn what_touches_nothing_hangs_on_the_nearest() {
         ("far", at(7.0, 0.0), one),
         ("arm", at(3.5, 0.0), DVec3::new(4.0, 1.0, 1.0)),
         ("low", at(0.0, -7.0), one),
-        ("far", at(9.0, 0.0), one),
+        ("farther", at(9.0, 0.0), one),
     ]));
     let a = a.unwrap();
     sound(&a);
     assert_eq!(parent(&a, "arm"), Some("trunk".into()), "it reaches into the trunk");
     assert_eq!(parent(&a, "far"), Some("arm".into()));
-    assert_eq!(parent(&a, "far#2"), Some("far".into()));
+    assert_eq!(parent(&a, "farther"), Some("far".into()));
     assert_eq!(parent(&a, "low"), Some("trunk".into()));
     assert!((joint(&a, "low").head.y + 5.25).abs() < 0.1, "{}", joint(&a, "low").head);
     let head = joint(&a, "arm").head;
     assert!((head - at(1.75, 0.0)).length() < 0.3, "in the middle of the overlap: {head}");
+}
+
+#[test]
+fn names_given_twice_are_numbered() {
+    let arm = Solid::new(Arc::new(chain()));
+    let beside = arm.placed(Affine::new(DVec3::new(0.0, 3.0, 0.0), DVec3::ZERO, DVec3::ONE));
+    let a = by_groups(&Solid::group(&[arm, beside]).to_mesh().unwrap()).unwrap();
+    sound(&a);
+    assert_eq!(a.rig().joints().len(), 6);
+    assert_eq!(parent(&a, "hand#2"), Some("fore#2".into()));
+    assert_eq!(parent(&a, "fore#2"), Some("fore".into()));
 }
 
 /// Long ellipsoids from the origin to the tips.
