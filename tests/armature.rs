@@ -95,7 +95,12 @@ fn a_pose_that_differs_in_one_joint_shares_all_other_parts() {
     assert!((1..=2).contains(&moved(&before, &after)), "{}", moved(&before, &after));
     assert_eq!(moved(&before, &body.posed(&pose, &rules).unwrap()), 0, "the way back finds the old meshes");
     // Sharing changes nothing: another thread, which remembers nothing, makes the same.
-    let fresh = std::thread::scope(|s| s.spawn(|| body.posed(&other, &rules).unwrap()).join().unwrap());
+    let elsewhere = || {
+        let solid = body.posed(&other, &rules).unwrap();
+        assert!(!solid.instances().is_empty(), "meshes are made where somebody first looks");
+        solid
+    };
+    let fresh = std::thread::scope(|s| s.spawn(elsewhere).join().unwrap());
     for (a, b) in after.instances().iter().zip(fresh.instances()) {
         assert!(*a.mesh == *b.mesh && !Arc::ptr_eq(&a.mesh, &b.mesh));
     }

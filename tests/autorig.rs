@@ -149,5 +149,23 @@ fn the_shipped_program_draws_it_both_ways() {
         pictures.insert(std::fs::read(f.path().join("sheet.png")).unwrap());
     }
     assert_eq!(pictures.len(), 2);
-    f.refuses(&["sample", "autorig.pcad", "--set", "from=skin"], "one of \"groups\", \"skeleton\"");
+}
+
+#[test]
+fn meshes_that_cannot_be_rigged_are_named_with_what_can_be_done() {
+    let f = Folder::new("autorig_errors");
+    f.write("flat.obj", "v 0 0 0\nv 1 0 0\nv 0 1 0\nf 1 2 3\n").write(
+        "p.pcad",
+        "include \"std/scene.pcad\" as scene; param from: string = \"groups\"; data m: mesh = mesh(\"flat.obj\");\n\
+         assume x ~ normal(0, 1); observe normal(x, 1) = len(scene.autorig(m, from = from).joints);",
+    );
+    let run = |from: &str, says: &str| {
+        let set = format!("from={from}");
+        f.refuses(&["run", "p.pcad", "--set", &set, "--steps", "5", "--warmup", "5", "--chains", "1", "--quiet"], says);
+    };
+    run("groups", "needs 2 to 256 groups in the mesh; it has 1");
+    let d = f.run(&["run", "p.pcad", "--quiet"]);
+    assert!(d.err.contains("hint: for a mesh of one piece there is `from = \"skeleton\"`"), "{}", d.err);
+    run("skeleton", "a skeleton needs a closed mesh; this one has 3 open edges");
+    run("skin", "one of \"groups\", \"skeleton\"");
 }

@@ -315,7 +315,7 @@ fn programs_read_them_with_options() {
     let text = r#"include "std/scene.pcad" as scene;
         data body = armature("body.glb", up = "z", unit = 0.01);
         data crate = mesh("box.glb", unit = 0.01, up = "z");
-        observe normal(scene.skin(body, {}).landmarks.hand_l[0], 1) = HAND;
+        observe normal(scene.skin(body, []).landmarks.hand_l[0], 1) = HAND;
         observe normal(crate.height, 1) = TALL;
         assume x ~ normal(0, 1);"#;
     let program = |text: &str| {

@@ -47,7 +47,15 @@ pub fn observe(mut program: Program, job: &Job) -> Result<(Program, Option<Photo
             }
             // Who is meant may depend on the photograph, which may come later.
             Some("keypoints") => detected.push((name, path)),
-            _ => program = program.observe_file(&name, &path)?,
+            other => {
+                program = match entry(&path) {
+                    Some((file, id)) => {
+                        let value = part(other.unwrap_or("json"), &path, file, id)?;
+                        program.observe(&name, value)
+                    }
+                    None => program.observe_file(&name, &path)?,
+                }
+            }
         }
     }
     if let Some(path) = &job.keypoints {
@@ -68,6 +76,21 @@ pub fn observe(mut program: Program, job: &Job) -> Result<(Program, Option<Photo
         program = program.observe(&name, Value::object(ImageValue::contours(map, photo)));
     }
     Ok((program, image.map(|(_, p)| p)))
+}
+
+/// The file and entry of `FILE#ID`; a file that is called so is a file.
+fn entry(path: &str) -> Option<(&str, &str)> {
+    path.rsplit_once('#').filter(|(file, id)| !file.is_empty() && !id.is_empty() && !Path::new(path).exists())
+}
+
+/// One entry of a JSON object, as data of a kind.
+fn part(kind: &str, called: &str, file: &str, id: &str) -> Result<Value, Failure> {
+    let all: serde_json::Value =
+        serde_json::from_slice(&files::read(Path::new(file))?).map_err(|e| plain(format!("{file}: {e}")))?;
+    let found = all.get(id).ok_or_else(|| plain(format!("{file}: there is no entry {id:?}")))?;
+    let alone = |other: &str| Err(format!("{called} names {other}, but an entry of a file has no files beside it"));
+    data::load(kind, called, found.to_string().as_bytes(), &data::Options::default(), &alone)
+        .map_err(|e| Failure::Plain(e.message, e.hint))
 }
 
 fn decode(path: &Path) -> Result<Photo, Failure> {

@@ -24,7 +24,8 @@ struct Group {
     surface: Surface,
     /// Its vertices, in rising order.
     vertices: Vec<u32>,
-    /// The mean over its area.
+    /// Twice its area, and the mean over it.
+    area: f64,
     centre: DVec3,
 }
 
@@ -55,7 +56,9 @@ pub(super) fn rig(positions: &[Vec3], triangles: &[[u32; 3]], mesh: &Mesh) -> Re
             (contacts[i][j], contacts[j][i]) = (Some(c), Some(c));
         }
     }
-    let off = |g: &Group| (g.centre - bounds.centre()).length();
+    let (sum, area) = groups.iter().fold((DVec3::ZERO, 0.0), |(s, a), g| (s + g.centre * g.area, a + g.area));
+    let middle = if area > 0.0 { sum / area } else { bounds.centre() };
+    let off = |g: &Group| (g.centre - middle).length();
     let root = (0..n).fold(0, |best, i| if off(&groups[i]) < off(&groups[best]) { i } else { best });
     let (order, parents) = hang(&groups, &contacts, root, near);
     let mut number = vec![0; n];
@@ -129,36 +132,32 @@ fn groups(positions: &[Vec3], triangles: &[[u32; 3]], mesh: &Mesh) -> Result<Vec
             count += 1;
             name = format!("{given}#{count}");
         }
-        groups.push(Group {
-            name,
-            surface: Surface { faces, bounds },
-            vertices: vertices.into_iter().collect(),
-            centre,
-        });
+        let vertices = vertices.into_iter().collect();
+        groups.push(Group { name, surface: Surface { faces, bounds }, vertices, area, centre });
     }
     Ok(groups)
 }
 
-/// The vertices of each that are as near to the other as any, give or take `near`; those inside are at distance 0.
+/// Half-way between either's vertices and the other, for those that are as near as any, give or take `near`; vertices inside
+/// the other are there.
 fn contact(a: &Group, b: &Group, positions: &[Vec3], near: f64) -> Contact {
     let (mut gap, mut found) = (f64::INFINITY, Vec::new());
     for (one, other) in [(a, b), (b, a)] {
         for v in &one.vertices {
             let p = positions[*v as usize].as_dvec3();
             if other.surface.to_box(p) <= gap + near {
-                let d = other.surface.distance(p);
+                let (d, at) = other.surface.nearest(p);
                 gap = gap.min(d);
-                found.push((*v, d));
+                found.push((*v, d, 0.5 * (p + at)));
             }
         }
     }
-    found.retain(|(_, d)| *d <= gap + near);
+    found.retain(|(_, d, _)| *d <= gap + near);
     // A vertex of both counts once.
-    found.sort_by_key(|(v, _)| *v);
-    found.dedup_by_key(|(v, _)| *v);
-    let point = |(v, _): &(u32, f64)| positions[*v as usize].as_dvec3();
-    let at = found.iter().map(point).sum::<DVec3>() / found.len().max(1) as f64;
-    let radius = found.iter().map(|f| (point(f) - at).length()).fold(near, f64::max);
+    found.sort_by_key(|(v, ..)| *v);
+    found.dedup_by_key(|(v, ..)| *v);
+    let at = found.iter().map(|f| f.2).sum::<DVec3>() / found.len().max(1) as f64;
+    let radius = found.iter().map(|f| (f.2 - at).length()).fold(near, f64::max);
     Contact { gap, at, radius }
 }
 

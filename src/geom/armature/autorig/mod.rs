@@ -28,7 +28,8 @@ pub const MOST_BONES: usize = 256;
 /// `part_1`, `part_2`, ….
 ///
 /// Parts are neighbours where they touch, overlap, or are nearer than a hundredth of the diagonal of the mesh's box; their
-/// joint is the mean of the vertices in contact. The part whose centre is nearest to the mesh's is the root; the others hang
+/// joint is the mean of the vertices in contact, half-way across a gap. The part whose centre (the mean over its area) is nearest
+/// to the mesh's is the root; the others hang
 /// on it by the shortest paths over centres and joints, and what touches nothing by its nearest part. A vertex goes with its
 /// part, and within the contact, up to half as far again, with the neighbours' joints too. Keypoints: each joint's head.
 ///

@@ -12,10 +12,18 @@ pub(super) struct Surface {
 }
 
 impl Surface {
-    /// The distance from a point; 0 inside.
-    pub fn distance(&self, p: DVec3) -> f64 {
-        let square = self.faces.iter().fold(f64::INFINITY, |d, t| d.min((closest(p, t) - p).length_squared()));
-        if self.to_box(p) == 0.0 && self.winding(p) > 0.5 { 0.0 } else { square.sqrt() }
+    /// The distance from a point and the nearest point of it; inside the distance is 0 and the point itself is nearest.
+    pub fn nearest(&self, p: DVec3) -> (f64, DVec3) {
+        if self.to_box(p) == 0.0 && self.winding(p) > 0.5 {
+            return (0.0, p);
+        }
+        let start = (f64::INFINITY, p);
+        let (square, at) = self.faces.iter().fold(start, |best, t| {
+            let at = closest(p, t);
+            let square = (at - p).length_squared();
+            if square < best.0 { (square, at) } else { best }
+        });
+        (square.sqrt(), at)
     }
 
     /// The distance from its box, 0 within: never more than that from the surface.
@@ -97,7 +105,8 @@ mod tests {
             (DVec3::new(-2.0, 2.0, 2.0), 3f64.sqrt()),
         ];
         for (p, d) in cases {
-            assert!((s.distance(p) - d).abs() < 1e-6, "{p} {}", s.distance(p));
+            let (found, at) = s.nearest(p);
+            assert!((found - d).abs() < 1e-6 && ((at - p).length() - d).abs() < 1e-6, "{p} {found}");
             assert!(s.to_box(p) <= d + 1e-6);
         }
         assert!((s.winding(DVec3::new(0.2, 0.1, 0.7)) - 1.0).abs() < 1e-9);

@@ -1,0 +1,65 @@
+//! What one joint's change costs on the shipped body: skinning and contours at 128 pixels, for each joint, beside a full redraw.
+//!
+//!     cargo run --release --example joint_speed
+//!
+//! Medians of processor-bound wall time on one thread; ratios of one run mean something, single times depend on the machine.
+
+use glam::DVec3;
+use pcadlang::geom::armature::{Armature, JointPose, Rules, morphs_from_json, rig_from_json};
+use pcadlang::geom::{Affine, GeomError, obj};
+use pcadlang::lang::load::embedded;
+use pcadlang::render::{Camera, View};
+use std::sync::Arc;
+use std::time::Instant;
+
+fn body(lod: &str) -> Result<Arc<Armature>, GeomError> {
+    let file = |end: &str| embedded(&format!("std/human/{lod}.{end}")).unwrap_or_default().as_bytes();
+    let rig = rig_from_json(file("rig.json"))?;
+    let mesh = obj::indexed(file("obj"))?;
+    let morphs = morphs_from_json(file("morphs.json"), &rig.rig)?;
+    Ok(Arc::new(Armature::new(rig.rig, mesh.positions, mesh.triangles, rig.influences)?.with_morphs(morphs)?))
+}
+
+fn median(mut xs: Vec<f64>) -> f64 {
+    xs.sort_by(f64::total_cmp);
+    xs.get(xs.len() / 2).copied().unwrap_or(f64::NAN)
+}
+
+fn main() -> Result<(), GeomError> {
+    const REPEATS: usize = 201;
+    let camera = Camera::default_for(128, 128);
+    let place = Affine::new(DVec3::new(0.0, -1.8, 0.0), DVec3::new(0.05, 0.5, 0.0), DVec3::splat(2.1));
+    let rules = Rules::default();
+    for lod in ["human.lod2", "human.lod1", "human"] {
+        let body = body(lod)?;
+        let joints = body.rig().joints();
+        let draw = |pose: &[JointPose]| -> Result<f64, GeomError> {
+            let begun = Instant::now();
+            let view = View::new(body.posed(pose, &rules)?.placed(place), camera);
+            std::hint::black_box(view.contours(128).len());
+            Ok(begun.elapsed().as_secs_f64() * 1e6)
+        };
+        // The joint turns by a little more each time, so no result can be one from before.
+        let mut time = |joint: usize| -> Result<f64, GeomError> {
+            let mut pose = vec![JointPose::REST; joints.len()];
+            let mut times = Vec::with_capacity(REPEATS);
+            for k in 0..REPEATS {
+                pose[joint] = JointPose::turned(DVec3::new(0.1, 0.05, 0.02) * (1.0 + k as f64 * 1e-3));
+                times.push(draw(&pose)?);
+            }
+            Ok(median(times))
+        };
+        // The root moves every part: a full redraw.
+        let full = time(0)?;
+        println!("{lod}: {} triangles, full redraw {full:.0} us", body.triangles().len());
+        let mut all = Vec::new();
+        for (j, joint) in joints.iter().enumerate() {
+            let t = time(j)?;
+            all.push(t);
+            println!("  {:<12} {t:>6.0} us  {:>5.1} times less", joint.name, full / t);
+        }
+        let mean = all.iter().sum::<f64>() / all.len() as f64;
+        println!("  a joint at random: {mean:.0} us, {:.1} times less than a full redraw", full / mean);
+    }
+    Ok(())
+}
