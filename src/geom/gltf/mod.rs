@@ -18,6 +18,9 @@ use super::{FileFrame, GeomError, Mesh};
 use glam::Vec3;
 use rustc_hash::FxHashMap;
 
+/// The bits of a vertex's place and weights.
+type Same = ([u32; 3], [u16; 4], [u32; 4]);
+
 /// What a glTF file's scene holds, in scene units, +y up; bodies are in their bind pose.
 #[derive(Clone, Debug, Default, PartialEq)]
 pub struct Loaded {
@@ -68,7 +71,7 @@ impl Loaded {
         let Some(rig) = self.rig else {
             return Err(GeomError::invalid("the glTF file has no skin, so nothing says which joint moves what"));
         };
-        let mut known: FxHashMap<([u32; 3], [u16; 4], [u32; 4]), u32> = FxHashMap::default();
+        let mut known: FxHashMap<Same, u32> = FxHashMap::default();
         let (mut positions, mut influences) = (Vec::new(), Vec::new());
         let mut number = vec![None; self.positions.len()];
         for ((p, i), n) in self.positions.iter().zip(&self.influences).zip(&mut number) {
