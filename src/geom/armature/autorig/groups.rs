@@ -179,16 +179,18 @@ fn hang(
             open.fold(None, |best: Option<usize>, i| if best.is_none_or(|b| far[i] < far[b]) { Some(i) } else { best });
         let Some(mut next) = next else { break };
         if far[next].is_infinite() {
-            let mut best = f64::INFINITY;
+            let mut best: Option<(usize, usize, Contact)> = None;
             for i in (0..n).filter(|i| !done[*i]) {
                 for j in (0..n).filter(|j| done[*j]) {
-                    if let Some(c) = contacts[i][j].filter(|c| c.gap < best) {
-                        best = c.gap;
-                        next = i;
-                        parents[i] = Some(j);
-                        far[i] = far[j] + way(&groups[j], &c, &groups[i]);
+                    if let Some(c) = contacts[i][j].filter(|c| best.is_none_or(|b| c.gap < b.2.gap)) {
+                        best = Some((i, j, c));
                     }
                 }
+            }
+            if let Some((i, j, c)) = best {
+                next = i;
+                parents[i] = Some(j);
+                far[i] = far[j] + way(&groups[j], &c, &groups[i]);
             }
         }
         done[next] = true;

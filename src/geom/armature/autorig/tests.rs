@@ -102,12 +102,14 @@ fn what_touches_nothing_hangs_on_the_nearest() {
 #[test]
 fn names_given_twice_are_numbered() {
     let arm = Solid::new(Arc::new(chain()));
-    let beside = arm.placed(Affine::new(DVec3::new(0.0, 3.0, 0.0), DVec3::ZERO, DVec3::ONE));
-    let a = by_groups(&Solid::group(&[arm, beside]).to_mesh().unwrap()).unwrap();
+    // Upright, with its upper end over the middle of the other.
+    let turn = DVec3::new(0.0, 0.0, std::f64::consts::FRAC_PI_2);
+    let upright = arm.placed(Affine::new(DVec3::new(2.0, 3.0, 0.0), turn, DVec3::ONE));
+    let a = by_groups(&Solid::group(&[arm, upright]).to_mesh().unwrap()).unwrap();
     sound(&a);
-    assert_eq!(a.rig().joints().len(), 6);
-    assert_eq!(parent(&a, "hand#2"), Some("fore#2".into()));
-    assert_eq!(parent(&a, "fore#2"), Some("fore".into()));
+    let parents = ["upper#2", "fore#2", "hand#2", "fore", "hand", "upper"].map(|n| parent(&a, n));
+    let expected = [None, Some("upper#2"), Some("fore#2"), Some("upper#2"), Some("fore"), Some("fore")];
+    assert_eq!(parents, expected.map(|p| p.map(String::from)));
 }
 
 /// Long ellipsoids from the origin to the tips.

@@ -37,7 +37,7 @@ pub(super) fn bones(nodes: Vec<Node>, cell: f64, most: usize) -> Vec<Bone> {
     contract(&mut chains, cell);
     let mut tolerance = TOLERANCE * cell;
     for _ in 0..TRIES {
-        if 1 + chains.iter().map(|c| simplified(&c.points, tolerance).len() - 1).sum::<usize>() <= most {
+        if chains.iter().map(|c| simplified(&c.points, tolerance).len() - 1).sum::<usize>() < most {
             break;
         }
         tolerance *= GROWTH;
