@@ -40,7 +40,7 @@ fn main() -> Result<(), GeomError> {
             Ok(begun.elapsed().as_secs_f64() * 1e6)
         };
         // The joint turns by a little more each time, so no result can be one from before.
-        let mut time = |joint: usize| -> Result<f64, GeomError> {
+        let time = |joint: usize| -> Result<f64, GeomError> {
             let mut pose = vec![JointPose::REST; joints.len()];
             let mut times = Vec::with_capacity(REPEATS);
             for k in 0..REPEATS {

@@ -251,6 +251,9 @@ impl<T: Real> M3<T> {
 mod tests {
     use super::*;
 
+    type Plain = fn(V3<f64>) -> M3<f64>;
+    type Taped = for<'a> fn(V3<Var<'a>>) -> M3<Var<'a>>;
+
     #[test]
     fn rotations_and_their_derivatives() {
         for v in [[0.3, -0.4, 1.2], [1e-5, 2e-5, -1e-5], [0.0; 3], [3.0, 0.5, -0.2]] {
@@ -262,7 +265,7 @@ mod tests {
             let got = M3::from_angles(V3(v)).0.concat();
             assert!(turned.transpose().to_cols_array().iter().zip(&got).all(|(a, b)| (a - b).abs() < 1e-14));
             let weights: Vec<f64> = (0..9).map(|i| libm::cos(f64::from(i))).collect();
-            let by: [(fn(V3<f64>) -> M3<f64>, for<'a> fn(V3<Var<'a>>) -> M3<Var<'a>>); 2] = [
+            let by: [(Plain, Taped); 2] = [
                 (M3::from_rotation_vector, |v| M3::from_rotation_vector(v)),
                 (M3::from_angles, |v| M3::from_angles(v)),
             ];
