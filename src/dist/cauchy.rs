@@ -22,6 +22,17 @@ impl Cauchy {
     }
 }
 
+/// The derivatives at z scales from the location; the same for one half of the distribution.
+pub(super) fn cauchy_slope(z: f64, scale: f64) -> Slope {
+    // 2 z / (1 + z^2) and z times it, with no overflow.
+    let (once, twice) = if z.abs() < 1.0 {
+        (2.0 * z / (1.0 + z * z), 2.0 * z * z / (1.0 + z * z))
+    } else {
+        (2.0 / (z + 1.0 / z), 2.0 / (1.0 + 1.0 / z / z))
+    };
+    Slope::new(-once / scale, [once / scale, (twice - 1.0) / scale])
+}
+
 impl Scalar for Cauchy {
     const NAME: &'static str = "cauchy";
 
@@ -46,14 +57,7 @@ impl Scalar for Cauchy {
     }
 
     fn slope(&self, x: f64) -> Slope {
-        let z = standard(x, self.location, self.scale);
-        // 2 z / (1 + z^2) and z times it, with no overflow.
-        let (once, twice) = if z.abs() < 1.0 {
-            (2.0 * z / (1.0 + z * z), 2.0 * z * z / (1.0 + z * z))
-        } else {
-            (2.0 / (z + 1.0 / z), 2.0 / (1.0 + 1.0 / z / z))
-        };
-        Slope::new(-once / self.scale, [once / self.scale, (twice - 1.0) / self.scale])
+        cauchy_slope(standard(x, self.location, self.scale), self.scale)
     }
 
     fn number_mean(&self) -> Option<f64> {

@@ -1,5 +1,6 @@
 //! The upper half of a Cauchy distribution.
 
+use super::cauchy::cauchy_slope;
 use super::draw::{log1p_square, standard};
 use super::param::{finite, positive};
 use super::{ParamError, Scalar, Slope, Support};
@@ -44,14 +45,7 @@ impl Scalar for HalfCauchy {
     }
 
     fn slope(&self, x: f64) -> Slope {
-        let z = standard(x, self.location, self.scale);
-        // 2 z / (1 + z^2) and z times it, with no overflow.
-        let (once, twice) = if z < 1.0 {
-            (2.0 * z / (1.0 + z * z), 2.0 * z * z / (1.0 + z * z))
-        } else {
-            (2.0 / (z + 1.0 / z), 2.0 / (1.0 + 1.0 / z / z))
-        };
-        Slope::new(-once / self.scale, [once / self.scale, (twice - 1.0) / self.scale])
+        cauchy_slope(standard(x, self.location, self.scale), self.scale)
     }
 
     fn number_mean(&self) -> Option<f64> {

@@ -57,6 +57,14 @@ impl Fault {
         self.hint = Some(hint.into());
         self
     }
+
+    /// The same with a hint for a name that is not known: the known one most like it, or all of them after `introduced`.
+    pub fn with_nearest<'a>(self, name: &str, introduced: &str, known: impl Iterator<Item = &'a str> + Clone) -> Self {
+        match crate::diag::nearest(name, known.clone()) {
+            Some(near) => self.with_hint(format!("did you mean `{near}`?")),
+            None => self.with_hint(format!("{introduced} {}", known.collect::<Vec<_>>().join(", "))),
+        }
+    }
 }
 
 /// A failure while a program runs.

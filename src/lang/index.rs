@@ -17,11 +17,7 @@ pub fn index_value(base: &Value, key: &Value) -> Result<Value, Fault> {
         }
         (Value::Record(r), Value::Str(name)) => r.get(name).cloned().ok_or_else(|| {
             let fault = Fault::new(FaultKind::Index, format!("the record has no field `{name}`"));
-            let fields = r.keys().map(|k| &**k);
-            match crate::diag::nearest(name, fields.clone()) {
-                Some(near) => fault.with_hint(format!("did you mean `{near}`?")),
-                None => fault.with_hint(format!("its fields are {}", fields.collect::<Vec<_>>().join(", "))),
-            }
+            fault.with_nearest(name, "its fields are", r.keys().map(|k| &**k))
         }),
         (Value::Object(o), Value::Str(name)) => o
             .field(name)

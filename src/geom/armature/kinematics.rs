@@ -107,42 +107,40 @@ fn places<T: Real>(rig: &Rig, mut motions: Vec<Motion<T>>, rules: &Rules, all: b
     let mut pulled = vec![V3([zero; 3]); motions.len()];
     let mut chain = Vec::new();
     let unscaled = |motions: &[Motion<T>], pulled: &[V3<T>]| forward(rig, &heads, motions, pulled, |m| m.turn);
-    if all || motions.iter().any(|m| !m.location.is_zero()) {
-        let mut now = unscaled(&motions, &pulled);
-        for b in 0..motions.len() {
-            let t = motions[b].location;
-            if t.is_zero() && !all {
-                continue;
-            }
-            chain.clear();
-            let mut at = rig.joints()[b].parent;
-            while let Some(a) = at {
-                chain.push(a);
-                at = if rules.stops.get(a) == Some(&true) { None } else { rig.joints()[a].parent };
-            }
-            let mut p = now[b].point(heads[b]);
-            let target = p + t;
-            for a in &chain {
-                let pivot = now[*a].point(heads[*a]);
-                let q = part_of_arc(p - pivot, target - pivot, 1.0 / chain.len() as f64);
-                p = pivot + q.apply(p - pivot);
-                // The turn in the frame of the parent, which this sweep has not moved yet.
-                let local = rig.joints()[*a].parent.map_or(q, |up| {
-                    let w = now[up].linear;
-                    w.transposed().times(q).times(w)
-                });
-                motions[*a].turn = local.times(motions[*a].turn);
-            }
-            now = unscaled(&motions, &pulled);
-            let left = target - now[b].point(heads[b]);
-            pulled[b] = rig.joints()[b].parent.map_or(left, |up| now[up].linear.transposed().apply(left));
-            now = unscaled(&motions, &pulled);
+    let mut now = unscaled(&motions, &pulled);
+    for b in 0..motions.len() {
+        let t = motions[b].location;
+        if t.is_zero() && !all {
+            continue;
         }
+        chain.clear();
+        let mut at = rig.joints()[b].parent;
+        while let Some(a) = at {
+            chain.push(a);
+            at = if rules.stops.get(a) == Some(&true) { None } else { rig.joints()[a].parent };
+        }
+        let mut p = now[b].point(heads[b]);
+        let target = p + t;
+        for a in &chain {
+            let pivot = now[*a].point(heads[*a]);
+            let q = part_of_arc(p - pivot, target - pivot, 1.0 / chain.len() as f64);
+            p = pivot + q.apply(p - pivot);
+            // The turn in the frame of the parent, which this sweep has not moved yet.
+            let local = rig.joints()[*a].parent.map_or(q, |up| {
+                let w = now[up].linear;
+                w.transposed().times(q).times(w)
+            });
+            motions[*a].turn = local.times(motions[*a].turn);
+        }
+        now = unscaled(&motions, &pulled);
+        let left = target - now[b].point(heads[b]);
+        pulled[b] = rig.joints()[b].parent.map_or(left, |up| now[up].linear.transposed().apply(left));
+        now = unscaled(&motions, &pulled);
     }
     if rules.inherit_scale {
         return forward(rig, &heads, &motions, &pulled, |m| m.turn.scaled(m.scale));
     }
-    let mut places = unscaled(&motions, &pulled);
+    let mut places = now;
     for ((place, m), head) in places.iter_mut().zip(&motions).zip(&heads) {
         let fixed = place.point(*head);
         place.linear = place.linear.scaled(m.scale);

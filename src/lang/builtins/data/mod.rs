@@ -87,7 +87,7 @@ fn not_an_expression(a: &Args) -> Result<Value, Fault> {
 }
 
 /// The kinds of data that [`load`] reads: what may stand after the colon of `data d: kind;`.
-pub fn kinds() -> impl Iterator<Item = &'static str> {
+pub fn kinds() -> impl Iterator<Item = &'static str> + Clone {
     TABLE.iter().map(|b| b.name)
 }
 
@@ -149,10 +149,7 @@ pub fn load(kind: &str, file: &str, bytes: &[u8], options: &Options, beside: &Be
         }
         _ => {
             let fault = Fault::type_error(format!("there is no data of type `{kind}`"));
-            return Err(match crate::diag::nearest(kind, kinds()) {
-                Some(near) => fault.with_hint(format!("did you mean `{near}`?")),
-                None => fault.with_hint(format!("there are {}", kinds().collect::<Vec<_>>().join(", "))),
-            });
+            return Err(fault.with_nearest(kind, "there are", kinds()));
         }
     };
     loaded.map_err(|why| Fault::new(FaultKind::Other, format!("{file}: {why}")))

@@ -55,7 +55,7 @@ pub(super) const TABLE: &[Builtin] = &[
                 let Value::Num(x) = v else { return Err(a.element_wrong(1, "a record of numbers", v)) };
                 if !body.morphs().any(|m| *m == **name) {
                     let f = Fault::type_error(format!("scene.shaped: the armature has no morph `{name}`"));
-                    return Err(nearest_of(f, name, body.morphs()));
+                    return Err(f.with_nearest(name, "it has", body.morphs()));
                 }
                 list.push((&**name, *x));
             }
@@ -100,18 +100,11 @@ fn armature<'a>(a: &Args<'a>) -> Result<&'a Arc<Armature>, Fault> {
     a.object::<ArmatureValue>(0, BODY).map(|v| &v.0)
 }
 
-fn nearest_of<'a>(f: Fault, name: &str, known: impl Iterator<Item = &'a str> + Clone) -> Fault {
-    match crate::diag::nearest(name, known.clone()) {
-        Some(near) => f.with_hint(format!("did you mean `{near}`?")),
-        None => f.with_hint(format!("it has {}", known.collect::<Vec<_>>().join(", "))),
-    }
-}
-
 /// The index of a joint of the argument's rig.
 fn joint(a: &Args, body: &Armature, name: &str) -> Result<usize, Fault> {
     body.rig().find(name).ok_or_else(|| {
         let f = Fault::type_error(format!("{}: the rig has no joint `{name}`", a.builtin.full_name()));
-        nearest_of(f, name, body.rig().joints().iter().map(|j| &*j.name))
+        f.with_nearest(name, "it has", body.rig().joints().iter().map(|j| &*j.name))
     })
 }
 
@@ -197,7 +190,7 @@ fn record(a: &Args, fields: &Record) -> Result<JointPose, Fault> {
             "scale" => pose.scale = of,
             _ => {
                 let f = Fault::type_error(format!("scene.skin: a joint's pose has no field `{name}`"));
-                return Err(nearest_of(f, name, ["rotvec", "rotate", "location", "scale"].into_iter()));
+                return Err(f.with_nearest(name, "it has", ["rotvec", "rotate", "location", "scale"].into_iter()));
             }
         }
     }
