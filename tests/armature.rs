@@ -3,7 +3,7 @@
 //! `data/mocap_poses.csv` holds two poses obtained from mocap.cs.cmu.edu (funded by NSF EIA-0196217), retargeted to the rig.
 
 use glam::{DAffine3, DVec3};
-use pcadlang::geom::armature::{Armature, JointPose, Rules, Turn, morphs_from_json, rig_from_json};
+use pcadlang::geom::armature::{Armature, JointPose, Rules, Stretch, Turn, morphs_from_json, rig_from_json};
 use pcadlang::geom::{Affine, obj};
 use pcadlang::lang::load::embedded;
 use pcadlang::render::{Camera, View};
@@ -147,6 +147,41 @@ fn shapes_add_up_and_move_the_joints() {
     let e = body.shaped(&[("wide", 1.0)]).unwrap_err().to_string();
     assert_eq!(e, "the body has no morph `wide`; it has male, female, heavy, thin, tall, short");
     assert!(body.shaped(&[("tall", f64::NAN)]).is_err());
+}
+
+#[test]
+fn stretching_a_bone_moves_what_hangs_on_it() {
+    let body = body("human.lod2");
+    let at = |name: &str| body.rig().find(name).unwrap();
+    let longer = body.stretched(&[(at("thigh_l"), Stretch::Along(1.2))]).unwrap();
+    let bone = |b: &Armature, name: &str| {
+        let j = &b.rig().joints()[at(name)];
+        j.tail - j.head
+    };
+    let thigh = bone(&body, "thigh_l");
+    assert!((bone(&longer, "thigh_l") - thigh * 1.2).length() < 1e-9);
+    let ankle = |b: &Armature| b.rig().keypoints().iter().find(|k| &*k.name == "l_ankle").unwrap().rest;
+    assert!((ankle(&longer) - ankle(&body) - thigh * 0.2).length() < 1e-9, "the calf moves along");
+    assert!((bone(&longer, "calf_l") - bone(&body, "calf_l")).length() < 1e-9, "and is not stretched");
+    for (v, (p, q)) in body.positions().iter().zip(longer.positions()).enumerate() {
+        let moved = (*q - *p).as_dvec3();
+        let weight = |name| {
+            let i = &body.influences()[v];
+            i.joints.iter().zip(i.weights).filter(|(j, _)| usize::from(**j) == at(name)).map(|(_, w)| w).sum::<f32>()
+        };
+        if weight("calf_l") == 1.0 {
+            assert!((moved - thigh * 0.2).length() < 1e-6);
+        }
+        if weight("thigh_l") + weight("calf_l") + weight("foot_l") + weight("ball_l") == 0.0 {
+            assert!(moved.length() < 1e-6, "vertex {v} belongs to others");
+        }
+    }
+    let wide = body.stretched(&[(at("pelvis"), Stretch::Axes(DVec3::new(1.5, 1.0, 1.0)))]).unwrap();
+    let hip = |b: &Armature| b.rig().joints()[at("thigh_l")].head;
+    assert!((hip(&wide).x - 1.5 * hip(&body).x).abs() < 1e-9 && (hip(&wide).y - hip(&body).y).abs() < 1e-9);
+    let e = body.stretched(&[(at("head"), Stretch::Along(0.0))]).unwrap_err().to_string();
+    assert_eq!(e, "the stretch of `head` must be positive and finite");
+    assert!(body.stretched(&[(99, Stretch::Along(1.0))]).is_err());
 }
 
 #[test]

@@ -11,6 +11,10 @@ use std::sync::Arc;
 pub fn index_value(base: &Value, key: &Value) -> Result<Value, Fault> {
     match (base, key) {
         (Value::Array(_) | Value::List(_), Value::Num(x)) => position(base, *x),
+        // As the arm below, without a value for each number.
+        (Value::Array(xs), Value::Array(at)) if at.iter().all(|x| place(xs.len(), *x).is_some()) => {
+            Ok(Value::Array(at.iter().map(|x| xs[*x as usize]).collect()))
+        }
         (Value::Array(_) | Value::List(_), Value::Array(at)) => {
             let picked: Result<Vec<Value>, Fault> = at.iter().map(|x| position(base, *x)).collect();
             picked.map(Value::from_elements)
@@ -35,17 +39,22 @@ pub fn index_value(base: &Value, key: &Value) -> Result<Value, Fault> {
 fn position(base: &Value, x: f64) -> Result<Value, Fault> {
     let len = base.len().unwrap_or(0);
     let fail = |why: String| Err(Fault::new(FaultKind::Index, why));
+    if let Some(i) = place(len, x) {
+        return base.element(i).map_or_else(|| fail("no such element".into()), Ok);
+    }
     if x != libm::trunc(x) {
         return fail(format!("an array is indexed by a whole number, got {x}"));
     }
-    if x < 0.0 || x >= len as f64 {
-        let range = match len {
-            0 => "it is empty".to_owned(),
-            _ => format!("its indices run from 0 to {}", len - 1),
-        };
-        return Err(Fault::new(FaultKind::Index, format!("no element {x} in an array of {len}")).with_hint(range));
-    }
-    base.element(x as usize).map_or_else(|| fail("no such element".into()), Ok)
+    let range = match len {
+        0 => "it is empty".to_owned(),
+        _ => format!("its indices run from 0 to {}", len - 1),
+    };
+    Err(Fault::new(FaultKind::Index, format!("no element {x} in an array of {len}")).with_hint(range))
+}
+
+/// The index that `x` is into so many elements.
+fn place(len: usize, x: f64) -> Option<usize> {
+    (x >= 0.0 && x < len as f64 && x == libm::trunc(x)).then_some(x as usize)
 }
 
 /// The components of `[x, y, z]` by name, as a record.

@@ -10,7 +10,7 @@ use super::recent;
 use super::{JointPose, Rig, Rules};
 use crate::geom::{GeomError, Landmark, Mesh, Solid, Topology, edges};
 use glam::{Affine3A, DAffine3, DVec3, Mat3A, Vec3, Vec3A};
-use std::sync::Arc;
+use std::sync::{Arc, LazyLock};
 
 /// The most joints that move one vertex.
 pub const MOST_WEIGHTS: usize = 4;
@@ -39,21 +39,36 @@ pub(super) struct Part {
 
 /// What shapes of one body share.
 #[derive(Debug)]
-struct Skin {
+pub(super) struct Skin {
     triangles: Vec<[u32; 3]>,
-    influences: Vec<Influence>,
+    pub influences: Vec<Influence>,
     parts: Vec<Part>,
     morphs: Vec<Morph>,
     /// What each keypoint follows.
     anchors: Vec<Anchor>,
 }
 
+/// The vertices at rest, and their normals.
+#[derive(Debug)]
+struct Surface {
+    positions: Vec<Vec3>,
+    normals: Vec<Vec3>,
+}
+
+impl Surface {
+    fn new(positions: Vec<Vec3>, triangles: &[[u32; 3]]) -> Surface {
+        Surface { normals: edges::smooth_normals(&positions, triangles), positions }
+    }
+}
+
+/// Made when someone looks: where only the rig's keypoints are compared, nobody does.
+type LazySurface = LazyLock<Surface, Box<dyn FnOnce() -> Surface + Send>>;
+
 /// A rig and its mesh.
 #[derive(Debug)]
 pub struct Armature {
     rig: Rig,
-    positions: Vec<Vec3>,
-    normals: Vec<Vec3>,
+    surface: Arc<LazySurface>,
     skin: Arc<Skin>,
 }
 
@@ -101,10 +116,12 @@ impl Armature {
             }
         }
         let parts = parts(rig.joints().len(), &triangles, &influences);
-        let normals = edges::smooth_normals(&positions, &triangles);
-        let anchors = rig.keypoints().iter().map(|k| Anchor::of(k, &rig, &positions)).collect();
+        let surface = Surface::new(positions, &triangles);
+        let anchors = rig.keypoints().iter().map(|k| Anchor::of(k, &rig, &surface.positions)).collect();
         let skin = Arc::new(Skin { triangles, influences, parts, morphs: Vec::new(), anchors });
-        Ok(Armature { rig, positions, normals, skin })
+        let lazy: LazySurface = LazyLock::new(Box::new(|| surface));
+        LazyLock::force(&lazy);
+        Ok(Armature { rig, surface: Arc::new(lazy), skin })
     }
 
     /// With offsets for its shape.
@@ -113,7 +130,7 @@ impl Armature {
     /// A morph of another number of vertices or joints, or two of one name.
     pub fn with_morphs(self, morphs: Vec<Morph>) -> Result<Armature, GeomError> {
         for (i, m) in morphs.iter().enumerate() {
-            m.check(self.positions.len(), self.rig.joints().len())?;
+            m.check(self.positions().len(), self.rig.joints().len())?;
             if morphs[..i].iter().any(|other| other.name == m.name) {
                 return Err(GeomError::invalid(format!("two morphs are called `{}`", m.name)));
             }
@@ -132,7 +149,7 @@ impl Armature {
 
     /// The vertices at rest.
     pub fn positions(&self) -> &[Vec3] {
-        &self.positions
+        &self.surface.positions
     }
 
     /// The triangles.
@@ -150,31 +167,57 @@ impl Armature {
         self.skin.morphs.iter().map(|m| &*m.name)
     }
 
-    /// The same body in another shape: each morph's offsets added so many times. Normals are those of the new rest.
+    /// The same body in another shape: each morph's offsets added so many times.
     ///
     /// # Errors
     /// A morph it does not have, an amount that is not finite.
     pub fn shaped(&self, amounts: &[(&str, f64)]) -> Result<Armature, GeomError> {
-        let mut positions = self.positions.clone();
         let n = self.rig.joints().len();
         let (mut heads, mut tails) = (vec![DVec3::ZERO; n], vec![DVec3::ZERO; n]);
         let mut points = vec![DVec3::ZERO; self.rig.keypoints().len()];
+        let mut added = Vec::with_capacity(amounts.len());
         for (name, amount) in amounts {
-            let Some(m) = self.skin.morphs.iter().find(|m| *m.name == **name) else {
+            let Some(k) = self.skin.morphs.iter().position(|m| *m.name == **name) else {
                 let all: Vec<&str> = self.morphs().collect();
                 return Err(GeomError::invalid(format!("the body has no morph `{name}`; it has {}", all.join(", "))));
             };
             if !amount.is_finite() {
                 return Err(GeomError::domain(format!("the amount of the morph `{name}` must be finite")));
             }
-            m.add(*amount, &mut positions, &mut heads, &mut tails);
+            let m = &self.skin.morphs[k];
+            m.move_joints(*amount, &mut heads, &mut tails);
+            added.push((k, *amount));
             for (d, anchor) in points.iter_mut().zip(&self.skin.anchors) {
                 *d += m.at(*anchor) * *amount;
             }
         }
-        let normals = edges::smooth_normals(&positions, &self.skin.triangles);
-        let rig = self.rig.moved(&heads, &tails, &points);
-        Ok(Armature { rig, positions, normals, skin: Arc::clone(&self.skin) })
+        let skin = Arc::clone(&self.skin);
+        Ok(self.reshaped(&heads, &tails, &points, move |positions| {
+            for (k, amount) in added {
+                skin.morphs[k].move_vertices(amount, positions);
+            }
+        }))
+    }
+
+    /// With joints and keypoints moved at rest by so much, and the vertices by a function of their places.
+    pub(super) fn reshaped(
+        &self,
+        heads: &[DVec3],
+        tails: &[DVec3],
+        points: &[DVec3],
+        change: impl FnOnce(&mut [Vec3]) + Send + 'static,
+    ) -> Armature {
+        let (before, skin) = (Arc::clone(&self.surface), Arc::clone(&self.skin));
+        let surface = move || {
+            let mut positions = before.positions.clone();
+            change(&mut positions);
+            Surface::new(positions, &skin.triangles)
+        };
+        Armature {
+            rig: self.rig.moved(heads, tails, points),
+            surface: Arc::new(LazyLock::new(Box::new(surface))),
+            skin: Arc::clone(&self.skin),
+        }
     }
 
     /// The body in a pose: one instance a part, numbered by joint, and its keypoints as landmarks. Parts that the last poses
@@ -202,17 +245,22 @@ impl Armature {
         Ok(solid.with_landmarks(landmarks))
     }
 
+    pub(super) fn skin(&self) -> Arc<Skin> {
+        Arc::clone(&self.skin)
+    }
+
     pub(super) fn parts(&self) -> &[Part] {
         &self.skin.parts
     }
 
     /// One part's mesh under the transforms of all joints.
     pub(super) fn skinned(&self, part: &Part, transforms: &[Affine3A]) -> Mesh {
+        let rest: &Surface = &self.surface;
         let (mut positions, mut normals) = (Vec::with_capacity(part.vertices.len()), Vec::new());
         normals.reserve_exact(part.vertices.len());
         for v in &part.vertices {
             let v = *v as usize;
-            let (p, n) = (self.positions[v], self.normals[v]);
+            let (p, n) = (rest.positions[v], rest.normals[v]);
             let Influence { joints, weights } = &self.skin.influences[v];
             let m =
                 if weights[0] == 1.0 { transforms[usize::from(joints[0])] } else { blend(joints, weights, transforms) };
@@ -233,7 +281,7 @@ impl Armature {
             m.matrix3 += glam::DMat3::from_cols(g * at.x, g * at.y, g * at.z);
             m.translation += g;
         };
-        for ((p, i), g) in self.positions.iter().zip(&self.skin.influences).zip(by_vertex) {
+        for ((p, i), g) in self.positions().iter().zip(&self.skin.influences).zip(by_vertex) {
             for (j, w) in i.joints.iter().zip(i.weights).filter(|(_, w)| *w > 0.0) {
                 add(usize::from(*j), f64::from(w), p.as_dvec3(), *g);
             }
@@ -254,7 +302,7 @@ impl Armature {
             let terms = i.joints.iter().zip(i.weights).filter(|(_, w)| *w > 0.0);
             terms.map(|(j, w)| t[usize::from(*j)].transform_point3(p.as_dvec3()) * f64::from(w)).sum()
         };
-        Ok(self.positions.iter().zip(&self.skin.influences).map(one).collect())
+        Ok(self.positions().iter().zip(&self.skin.influences).map(one).collect())
     }
 }
 

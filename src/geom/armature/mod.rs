@@ -9,6 +9,7 @@ mod real;
 mod recent;
 mod rig;
 mod rig_json;
+mod stretch;
 
 pub use body::{Armature, Influence, MOST_WEIGHTS};
 pub use kinematics::JointGradient;
@@ -16,3 +17,4 @@ pub use morph::Morph;
 pub use pose::{JointPose, Rules, Turn};
 pub use rig::{Joint, Keypoint, MOST_JOINTS, NamedJoint, Rig};
 pub use rig_json::{RigFile, morphs_from_json, rig_from_json};
+pub use stretch::Stretch;

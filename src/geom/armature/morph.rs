@@ -32,10 +32,13 @@ impl Morph {
         if finite { Ok(()) } else { Err(GeomError::invalid(format!("the morph `{}` is not finite", self.name))) }
     }
 
-    pub(super) fn add(&self, amount: f64, positions: &mut [Vec3], heads: &mut [DVec3], tails: &mut [DVec3]) {
+    pub(super) fn move_vertices(&self, amount: f64, positions: &mut [Vec3]) {
         for (p, d) in positions.iter_mut().zip(&self.vertices) {
             *p += *d * amount as f32;
         }
+    }
+
+    pub(super) fn move_joints(&self, amount: f64, heads: &mut [DVec3], tails: &mut [DVec3]) {
         for (at, d) in heads.iter_mut().zip(&self.heads).chain(tails.iter_mut().zip(&self.tails)) {
             *at += *d * amount;
         }

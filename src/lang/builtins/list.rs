@@ -216,6 +216,16 @@ fn concat(a: &Args) -> Result<Value, Fault> {
         let parts = (0..a.values.len()).map(|i| a.str(i)).collect::<Result<Vec<_>, _>>()?;
         return Ok(Value::Str(parts.concat().into()));
     }
+    // As below, without a value for each number.
+    if a.values.iter().all(|v| matches!(v, Value::Array(_))) {
+        let mut all = Vec::new();
+        for v in a.values {
+            if let Value::Array(xs) = v {
+                all.extend_from_slice(xs);
+            }
+        }
+        return Ok(Value::array(all));
+    }
     let mut all = Vec::new();
     for i in 0..a.values.len() {
         all.extend(a.elements(i)?.iter().cloned());

@@ -2,7 +2,7 @@
 
 use super::shapes::vector_of;
 use super::{ARMATURE, AffineValue, ArmatureValue, SOLID, SolidValue, fault, native};
-use crate::geom::armature::{Armature, JointPose, Rules, Turn, autorig};
+use crate::geom::armature::{Armature, JointPose, Rules, Stretch, Turn, autorig};
 use crate::lang::builtins::{Args, Builtin, Type, arg, opt};
 use crate::lang::error::Fault;
 use crate::lang::value::{Record, Value};
@@ -11,6 +11,7 @@ use std::sync::Arc;
 
 const SECTION: &str = "Bodies";
 const BODY: &str = "an armature";
+const FACTORS: &str = "a record of numbers, or of three numbers each";
 
 pub(super) const TABLE: &[Builtin] = &[
     native(
@@ -60,6 +61,33 @@ pub(super) const TABLE: &[Builtin] = &[
                 list.push((&**name, *x));
             }
             body.shaped(&list).map(|b| Value::object(ArmatureValue(Arc::new(b)))).map_err(fault)
+        },
+    ),
+    native(
+        "stretched",
+        SECTION,
+        &[
+            arg("rig", ARMATURE, "The armature."),
+            arg(
+                "factors",
+                Type::Record,
+                "By joint: how much longer its bone is, or three numbers for the axes at rest; each above 0.",
+            ),
+        ],
+        ARMATURE,
+        "The armature with bones longer or shorter at rest, such as `{ thigh_l: 1.1 }`; what hangs on them moves along.",
+        |a| {
+            let body = armature(a)?;
+            let Value::Record(factors) = a.get(1) else { return Err(a.wrong(1, FACTORS)) };
+            let mut list = Vec::with_capacity(factors.len());
+            for (name, v) in factors.iter() {
+                let stretch = match v {
+                    Value::Num(f) => Stretch::Along(*f),
+                    v => Stretch::Axes(vector_of(v).ok_or_else(|| a.element_wrong(1, FACTORS, v))?),
+                };
+                list.push((joint(a, body, name)?, stretch));
+            }
+            body.stretched(&list).map(|b| Value::object(ArmatureValue(Arc::new(b)))).map_err(fault)
         },
     ),
     native(
