@@ -65,6 +65,16 @@ impl Factor {
         (0..self.n).map(|i| mean[i] + dot(&self.packed[row(i)..=row(i) + i], &z[..=i])).collect()
     }
 
+    /// L' g.
+    pub fn transposed_times(&self, g: &[f64]) -> Vec<f64> {
+        let mut out = vec![0.0; self.n];
+        for (i, g) in g.iter().enumerate().take(self.n) {
+            let this = &self.packed[row(i)..=row(i) + i];
+            out.iter_mut().zip(this).for_each(|(o, l)| *o += l * g);
+        }
+        out
+    }
+
     /// L^-1 (x - mean).
     pub fn whiten(&self, mean: &[f64], x: &[f64]) -> Vec<f64> {
         let mut z: Vec<f64> = Vec::with_capacity(self.n);

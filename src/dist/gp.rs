@@ -42,6 +42,11 @@ impl Gp {
     pub fn to_centred(&self) -> Gp {
         Gp(self.0.centred())
     }
+
+    /// The derivatives by the white noise behind a value, from those by the value.
+    pub fn pull_noise(&self, by: &[f64]) -> Vec<f64> {
+        self.0.factor.transposed_times(by)
+    }
 }
 
 gaussian_family!(Gp, "gp");

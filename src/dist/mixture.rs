@@ -2,7 +2,7 @@
 
 use super::{Categorical, Datum, Dist, Distribution, Gradient, ParamError, Scalar, Support};
 use crate::num::log_sum_exp;
-use crate::rng::{Purpose, Stream, StreamKey};
+use crate::rng::Stream;
 
 /// `mixture(weights, components)`. The density is the weighted mean of the components' densities.
 ///
@@ -102,12 +102,6 @@ fn union(a: Support, b: Support) -> Option<Support> {
     })
 }
 
-/// How many derivatives by parameters a distribution has: those at a draw of it, the same one always.
-fn count_params(d: &Dist) -> usize {
-    let x = d.sample(&mut StreamKey::new(0, 0, Purpose::VALUES).stream(0, 0, 0));
-    d.gradient(&x).map_or(0, |g| g.params.len())
-}
-
 impl Distribution for Mixture {
     fn name(&self) -> &'static str {
         "mixture"
@@ -140,7 +134,7 @@ impl Distribution for Mixture {
                     g.x.iter_mut().zip(&one.x).for_each(|(a, b)| *a += share * b);
                     g.params.extend(one.params.iter().map(|p| share * p));
                 }
-                None => g.params.extend(std::iter::repeat_n(0.0, count_params(c))),
+                None => g.params.extend(std::iter::repeat_n(0.0, c.param_count())),
             }
         }
         let finite = g.x.iter().chain(&g.params).all(|g| !g.is_nan());

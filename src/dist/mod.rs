@@ -40,6 +40,7 @@ mod ordered;
 mod param;
 mod poisson;
 mod product;
+mod reverse;
 mod scalar;
 mod student_t;
 mod support;

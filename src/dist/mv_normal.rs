@@ -62,6 +62,11 @@ impl MvNormal {
     pub fn to_centred(&self) -> MvNormal {
         MvNormal(self.0.centred())
     }
+
+    /// The derivatives by the white noise behind a value, from those by the value.
+    pub fn pull_noise(&self, by: &[f64]) -> Vec<f64> {
+        self.0.factor.transposed_times(by)
+    }
 }
 
 fn shape(m: &DMatrix<f64>) -> String {

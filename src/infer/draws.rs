@@ -109,6 +109,9 @@ pub struct KernelStats {
     pub seconds: f64,
     /// Those rejected because the program has no value there (a domain error).
     pub failed: u64,
+    /// Trajectories on which the energy was not kept (Hamiltonian kernels).
+    #[serde(default)]
+    pub divergent: u64,
 }
 
 impl KernelStats {
@@ -126,6 +129,7 @@ impl KernelStats {
             t.accepted += s.accepted;
             t.seconds += s.seconds;
             t.failed += s.failed;
+            t.divergent += s.divergent;
         }
         sum.into_values().collect()
     }
@@ -143,6 +147,7 @@ mod tests {
             accepted,
             seconds: 0.5,
             failed: 1,
+            divergent: 0,
         };
         let total = KernelStats::total(&[k("mh", 4, 1), k("drift", 2, 2), k("mh", 6, 4)]);
         assert_eq!(total.iter().map(|t| &*t.name).collect::<Vec<_>>(), ["mh", "drift"]);

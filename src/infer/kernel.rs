@@ -45,17 +45,19 @@ pub struct Outcome {
     pub accepted: u32,
     /// Those rejected because the program has no value there (a scale that is not positive, a matrix that will not factor).
     pub failed: u32,
+    /// Trajectories on which the energy was not kept.
+    pub divergent: u32,
 }
 
 impl Outcome {
     /// One proposal.
     pub fn one(accepted: bool) -> Self {
-        Outcome { proposals: 1, accepted: u32::from(accepted), failed: 0 }
+        Outcome { proposals: 1, accepted: u32::from(accepted), ..Default::default() }
     }
 
     /// One proposal that led to a domain error.
     pub fn failed() -> Self {
-        Outcome { proposals: 1, accepted: 0, failed: 1 }
+        Outcome { proposals: 1, failed: 1, ..Default::default() }
     }
 }
 

@@ -3,6 +3,7 @@
 //! The way of a program: [`load`] finds its files, [`lower`] checks names and types and makes [`code`]; the trace runs it.
 
 pub mod address;
+pub mod adjoint;
 pub mod builtins;
 pub mod code;
 pub mod error;

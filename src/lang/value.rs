@@ -3,6 +3,7 @@
 //! Scene things (solids, views, photographs) enter as [`Object`]s and comparators as [`Likelihood`]s, so that neither the
 //! language nor the traces know what a picture is.
 
+use super::adjoint::Adjoint;
 use crate::dist::{Datum, Dist};
 use indexmap::IndexMap;
 use std::any::Any;
@@ -75,6 +76,10 @@ pub trait Object: Any + fmt::Debug + Send + Sync {
     fn multiply(&self, _other: &Value) -> Option<Result<Value, String>> {
         None
     }
+    /// The adjoints of both sides of `self * other`; `None` where they are not known.
+    fn pull_product(&self, _other: &Value, _by: &Adjoint) -> Option<[Adjoint; 2]> {
+        None
+    }
     /// `self.name`, where the type has fields.
     fn field(&self, _name: &str) -> Option<Value> {
         None
@@ -97,6 +102,11 @@ pub trait Likelihood: fmt::Debug + Send + Sync {
     /// # Errors
     /// When the observed value is of the wrong type or cannot be compared.
     fn log_density(&self, observed: &Value) -> Result<f64, String>;
+    /// The derivatives of the log density by what the likelihood was made from, in a form that the derivative of the built-in
+    /// that makes it understands; `None` where they are not known.
+    fn gradient(&self, _observed: &Value) -> Option<Adjoint> {
+        None
+    }
     /// False when the result is not a density over observations, so that its scale is a matter of choice; the run then
     /// says that its posterior is a pseudo-posterior.
     fn is_proper(&self) -> bool {

@@ -132,6 +132,21 @@ impl Camera {
         }
     }
 
+    /// The derivative by a scene point of a function of where it is in the picture, from that by its two pixel coordinates.
+    pub fn pull_point(&self, point: DVec3, [by_x, by_y]: [f64; 2]) -> DVec3 {
+        let from = point - self.eye;
+        let (x, y, depth) = (from.dot(self.right), from.dot(self.up), from.dot(self.forward));
+        match self.projection {
+            Projection::Pinhole { focal_px, .. } => {
+                let k = focal_px / depth;
+                self.right * (by_x * k) - self.up * (by_y * k) + self.forward * ((by_y * y - by_x * x) * k / depth)
+            }
+            Projection::Orthographic { units_per_pixel, .. } => {
+                self.right * (by_x / units_per_pixel) - self.up * (by_y / units_per_pixel)
+            }
+        }
+    }
+
     /// The scene point at a pixel position and depth; undoes [`Camera::project`].
     pub fn unproject(&self, x_px: f64, y_px: f64, depth: f64) -> DVec3 {
         let (x, y) = match self.projection {
@@ -176,6 +191,26 @@ mod tests {
         assert_eq!(camera.scaled_to(0).width, 1);
         let thin = Camera::default_for(1000, 2).scaled_to(10);
         assert_eq!((thin.width, thin.height), (10, 1));
+    }
+
+    #[test]
+    fn derivatives_of_a_projection_are_those_of_differences() {
+        let mut camera = Camera::default_for(64, 48);
+        for orthographic in [false, true] {
+            if orthographic {
+                camera.projection = Projection::Orthographic { units_per_pixel: 0.05, cx: 32.0, cy: 24.0 };
+            }
+            let (p, by) = (DVec3::new(0.4, 0.9, -1.5), [0.7, -1.3]);
+            let f = |p: DVec3| {
+                let (x, y, _) = camera.project(p);
+                by[0] * x + by[1] * y
+            };
+            let g = camera.pull_point(p, by);
+            for (axis, g) in DVec3::AXES.into_iter().zip(g.to_array()) {
+                let slope = (f(p + axis * 1e-6) - f(p - axis * 1e-6)) / 2e-6;
+                assert!((g - slope).abs() < 1e-6, "{g} {slope}");
+            }
+        }
     }
 
     #[test]

@@ -90,7 +90,7 @@ mod tests {
     use super::*;
 
     fn kernel(name: &str, proposals: u64, accepted: u64) -> KernelStats {
-        KernelStats { name: name.into(), proposals, accepted, seconds: 0.5, failed: 1 }
+        KernelStats { name: name.into(), proposals, accepted, seconds: 0.5, failed: 1, divergent: 0 }
     }
 
     #[test]

@@ -44,6 +44,12 @@ pub fn warnings(quantities: &[Quantity], kernels: &[KernelStats], chains: usize)
                  narrow the prior, or take smaller steps",
                 k.name, k.failed, k.proposals
             ));
+        } else if k.divergent > 0 {
+            out.push(format!(
+                "{}: {} of {} trajectories diverged: there are places too narrow for its steps, which it may never see; write \
+                 the program with choices of one scale (normal(0, 1) times a scale), or add `drift` to the mix",
+                k.name, k.divergent, k.proposals
+            ));
         } else if k.accepted == 0 {
             out.push(format!("{} accepted none of {} proposals; it only costs time", k.name, k.proposals));
         }
@@ -84,7 +90,7 @@ mod tests {
     }
 
     fn kernel(proposals: u64, accepted: u64, failed: u64) -> KernelStats {
-        KernelStats { name: "mh(@x)".into(), proposals, accepted, seconds: 0.1, failed }
+        KernelStats { name: "mh(@x)".into(), proposals, accepted, seconds: 0.1, failed, divergent: 0 }
     }
 
     #[test]

@@ -7,6 +7,7 @@
 mod choices;
 mod demand;
 mod eval;
+mod gradient;
 mod graph;
 mod journal;
 mod mark;
@@ -217,6 +218,20 @@ impl Trace {
             Some(node::Side::Choice(c)) if t.element != NONE => c.scores[t.element as usize],
             _ => node.score,
         }
+    }
+
+    /// The gradient of the log prior plus `power` times the log likelihood, by the unconstrained coordinates of these choices
+    /// one after the other, the log Jacobians of their transforms included (see [`Change::Free`]): in the present state, also that
+    /// of a pending proposal. Discrete choices have no coordinates. Appended to `out`.
+    ///
+    /// # Errors
+    /// An operation between a choice and the score of which no derivative is known.
+    pub fn gradient(&self, targets: &[Target], power: f64, out: &mut Vec<f64>) -> TraceResult<()> {
+        let mut scored: Vec<u32> = self.graph.choices.selections[0].targets().iter().map(|t| t.node).collect();
+        scored.dedup();
+        let effects = self.graph.nodes.iter().enumerate().filter(|(_, n)| n.state == State::Clean).map(|(i, _)| i as u32);
+        scored.extend(effects.filter(|n| matches!(self.graph.op(&self.code, *n), Op::Observe { .. } | Op::Factor { .. })));
+        self.graph.gradient(&self.code, targets, &scored, power, out)
     }
 
     /// Registers a selection; its members are kept up to date from then on.

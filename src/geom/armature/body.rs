@@ -245,6 +245,16 @@ impl Armature {
         Ok(solid.with_landmarks(landmarks))
     }
 
+    /// The derivative by the amount of one morph.
+    pub(super) fn pull_morph(&self, name: &str, heads: &[DVec3], keypoints: &[DVec3]) -> Result<f64, GeomError> {
+        let Some(m) = self.skin.morphs.iter().find(|m| *m.name == *name) else {
+            return Err(GeomError::invalid(format!("the body has no morph `{name}`")));
+        };
+        let by_heads: f64 = m.heads.iter().zip(heads).map(|(d, g)| d.dot(*g)).sum();
+        let points = self.skin.anchors.iter().zip(keypoints);
+        Ok(by_heads + points.map(|(anchor, g)| m.at(*anchor).dot(*g)).sum::<f64>())
+    }
+
     pub(super) fn skin(&self) -> Arc<Skin> {
         Arc::clone(&self.skin)
     }

@@ -10,6 +10,7 @@ mod recent;
 mod rig;
 mod rig_json;
 mod stretch;
+mod torque;
 
 pub use body::{Armature, Influence, MOST_WEIGHTS};
 pub use kinematics::JointGradient;
@@ -18,3 +19,4 @@ pub use pose::{JointPose, Rules, Turn};
 pub use rig::{Joint, Keypoint, MOST_JOINTS, NamedJoint, Rig};
 pub use rig_json::{RigFile, morphs_from_json, rig_from_json};
 pub use stretch::Stretch;
+pub use torque::BodyGradient;

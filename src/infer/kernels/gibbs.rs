@@ -80,7 +80,7 @@ impl Kernel for Gibbs {
         let before = trace.stored(target);
         let forward = self.weights(trace, at, target, &values, n, 0)?;
         let chosen = sample_log(&forward.log, &mut rng);
-        let mut outcome = Outcome { proposals: 1, accepted: 0, failed: forward.failed };
+        let mut outcome = Outcome { proposals: 1, failed: forward.failed, ..Default::default() };
         if Some(&values[chosen]) == before.as_ref() {
             return Ok(outcome);
         }

@@ -4,10 +4,12 @@ mod block;
 mod drift;
 mod elliptical;
 mod gibbs;
+mod hamiltonian;
 mod mh;
 
 pub use block::Block;
 pub use drift::Drift;
 pub use elliptical::Elliptical;
 pub use gibbs::Gibbs;
+pub use hamiltonian::{Hmc, Nuts};
 pub use mh::Mh;

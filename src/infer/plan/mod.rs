@@ -6,7 +6,7 @@ use super::draws::{DrawRow, KernelStats, Sink};
 use super::expr::{Scope, evaluate};
 use super::init::{StartError, start_of, starts};
 use super::kernel::{At, Kernel};
-use super::kernels::{Block, Drift, Elliptical, Gibbs, Mh};
+use super::kernels::{Block, Drift, Elliptical, Gibbs, Hmc, Mh, Nuts};
 use super::population::Population;
 use super::record::Recorder;
 use super::selection::{fail, scope, selector};
@@ -14,7 +14,7 @@ use crate::lang::code::Code;
 use crate::lang::error::RunError;
 use crate::lang::value::Value;
 use crate::rng::{Purpose, StreamKey};
-use crate::syntax::ast::{Expr, ExprKind, KStmt, KStmtKind, MixArm};
+use crate::syntax::ast::{Arg, Expr, ExprKind, KStmt, KStmtKind, MixArm};
 use crate::trace::{Constraint, Draws, Limits, Selector, Trace};
 use std::fmt;
 use std::sync::Arc;
@@ -469,6 +469,9 @@ impl Runner<'_> {
                     "block" => Box::new(Block::new(scope)),
                     "gibbs" => Box::new(Gibbs::new(scope)),
                     "elliptical" => Box::new(Elliptical::new(scope)),
+                    "hmc" => Box::new(Hmc::new(scope, self.setting(args, "steps", 10, 10_000)?, None)),
+                    "mala" => Box::new(Hmc::new(scope, 1, None)),
+                    "nuts" => Box::new(Nuts::new(scope, self.setting(args, "max_depth", 10, 20)?)),
                     "drift" => {
                         let scale = match args.get(1) {
                             None => None,
@@ -485,7 +488,7 @@ impl Runner<'_> {
                     _ => {
                         let message = format!("the kernel `{name}` is not available yet in this version");
                         let mut e = fail(e.span, message);
-                        e.hint = Some("those that are: mh, block, drift, gibbs, elliptical".into());
+                        e.hint = Some("those that are: mh, block, drift, gibbs, elliptical, hmc, mala, nuts".into());
                         return Err(e.into());
                     }
                 };
@@ -502,11 +505,21 @@ impl Runner<'_> {
             stats.proposals += u64::from(outcome.proposals);
             stats.accepted += u64::from(outcome.accepted);
             stats.failed += u64::from(outcome.failed);
+            stats.divergent += u64::from(outcome.divergent);
             stats.seconds += begun.elapsed().as_secs_f64();
         }
         self.step += 1;
         self.progress.steps.fetch_add(1, Ordering::Relaxed);
         Ok(if self.is_over() { Flow::End } else { Flow::Next })
+    }
+
+    /// A whole number that a kernel takes besides its selection.
+    fn setting(&mut self, args: &[Arg], name: &str, default: u32, most: u32) -> Result<u32, Box<RunError>> {
+        let Some(e) = argument(args, 1, name) else { return Ok(default) };
+        match self.value(e)? {
+            Value::Num(x) if x >= 1.0 && x <= f64::from(most) && x == libm::trunc(x) => Ok(x as u32),
+            v => Err(fail(e.span, format!("`{name}` is a whole number from 1 to {most}, got {v}"))),
+        }
     }
 
     /// The text of a kernel for tables.

@@ -6,7 +6,7 @@
 use super::covariance::CovarianceValue;
 use super::elementwise::array_len;
 use super::matrix::Matrix;
-use super::{Arg, Args, Builtin, Kind, Type, arg, opt};
+use super::{Arg, Args, Builtin, Derivative, Kind, Type, arg, opt};
 use crate::dist::{self, Dist, FAMILIES, Family, ParamError};
 use crate::lang::error::Fault;
 use crate::lang::value::Value;
@@ -26,6 +26,7 @@ macro_rules! scalar {
             returns: Type::Dist,
             doc: family($name).doc,
             kind: Kind::Distribution(|a| elementwise(a, &[], |[$($p),+]| $made)),
+            derivative: Derivative::Unknown,
         }
     };
 }
@@ -41,6 +42,7 @@ const fn other(name: &'static str, args: &'static [Arg], make: fn(&Args) -> Resu
         returns: Type::Dist,
         doc: family(name).doc,
         kind: Kind::Distribution(make),
+        derivative: Derivative::Unknown,
     }
 }
 

@@ -3,7 +3,7 @@
 //! This is their documentation and their arguments; what they do is the business of the engine. They are not values of
 //! the model.
 
-use super::{Arg, Builtin, Kind, Type, arg, opt};
+use super::{Arg, Builtin, Derivative, Kind, Type, arg, opt};
 
 const KERNELS: &str = "Kernels";
 const CHOICES: &str = "Selections and starts";
@@ -12,9 +12,6 @@ const MONITORS: &str = "Monitors and reports";
 /// What this version checks and documents but cannot run.
 pub(super) const PLANNED: &[&str] = &[
     "slice",
-    "hmc",
-    "nuts",
-    "mala",
     "knn",
     "delayed",
     "temper",
@@ -35,7 +32,7 @@ const fn name(
     returns: Type,
     doc: &'static str,
 ) -> Builtin {
-    Builtin { name, module: "", section, args, variadic: false, returns, doc, kind: Kind::Inference }
+    Builtin { name, module: "", section, args, variadic: false, returns, doc, kind: Kind::Inference, derivative: Derivative::Unknown }
 }
 
 const SEL: Arg = arg("sel", Type::Selection, "The choices it moves.");

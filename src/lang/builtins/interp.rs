@@ -1,8 +1,10 @@
 //! Linear interpolation of tables.
 
-use super::{Args, Builtin, Type, arg, function};
+use super::{Args, Builtin, Pulled, Type, arg, function};
+use crate::lang::adjoint::Adjoint;
 use crate::lang::error::Fault;
 use crate::lang::value::Value;
+use smallvec::smallvec;
 
 pub(super) const TABLE: &[Builtin] = &[function(
     "interp",
@@ -15,7 +17,8 @@ pub(super) const TABLE: &[Builtin] = &[function(
     Type::Nums,
     "The straight lines through a table of points, read at `x`; beyond its ends the values there.",
     interp,
-)];
+)
+.pull(pull)];
 
 fn interp(a: &Args) -> Result<Value, Fault> {
     let xs = a.numbers_from(1, 1)?;
@@ -43,4 +46,32 @@ fn interp(a: &Args) -> Result<Value, Fault> {
         Value::Num(x) => Ok(Value::Num(read(*x))),
         _ => Ok(Value::Array(a.numbers(0)?.iter().map(|x| read(*x)).collect())),
     }
+}
+
+/// By the places read, and by the values of the table; by its places where lines are straight between them.
+fn pull(a: &Args, _: &Value, by: &Adjoint) -> Option<Pulled> {
+    let (xs, ys) = (a.numbers(1).ok()?, a.numbers(2).ok()?);
+    let (mut by_xs, mut by_ys) = (vec![0.0; xs.len()], vec![0.0; ys.len()]);
+    let mut read = |x: f64, g: f64| {
+        let i = xs.partition_point(|p| *p <= x);
+        if i == 0 || i == xs.len() {
+            by_ys[i.saturating_sub(1)] += g;
+            return 0.0;
+        }
+        let width = xs[i] - xs[i - 1];
+        let (t, slope) = ((x - xs[i - 1]) / width, (ys[i] - ys[i - 1]) / width);
+        by_ys[i - 1] += g * (1.0 - t);
+        by_ys[i] += g * t;
+        by_xs[i - 1] -= g * slope * (1.0 - t);
+        by_xs[i] -= g * slope * t;
+        g * slope
+    };
+    let by_x = match a.get(0) {
+        Value::Num(x) => Adjoint::Num(read(*x, by.number())),
+        _ => {
+            let at = a.numbers(0).ok()?;
+            Adjoint::Array(at.iter().zip(by.numbers(at.len())).map(|(x, g)| read(*x, g)).collect())
+        }
+    };
+    Some(smallvec![by_x, Adjoint::Array(by_xs), Adjoint::Array(by_ys)])
 }

@@ -1,10 +1,12 @@
 //! Making, joining and searching arrays and records; truth tests over arrays; strings.
 
 use super::elementwise::{array, array_len, common_len, part};
-use super::{Arg, Args, Builtin, Type, arg, function, opt};
+use super::{Arg, Args, Builtin, Pulled, Type, arg, function, opt};
+use crate::lang::adjoint::Adjoint;
 use crate::lang::error::{Fault, FaultKind};
 use crate::lang::key::Key;
 use crate::lang::value::Value;
+use smallvec::smallvec;
 use std::cmp::Ordering;
 use std::sync::Arc;
 
@@ -23,7 +25,8 @@ pub(super) const TABLE: &[Builtin] = &[
         Type::Int,
         "The number of elements, fields or characters.",
         len,
-    ),
+    )
+    .flat(),
     function(
         "linspace",
         SECTION,
@@ -35,7 +38,17 @@ pub(super) const TABLE: &[Builtin] = &[
         Type::Array,
         "`n` evenly spaced numbers from `lo` to `hi`, both included.",
         linspace,
-    ),
+    )
+    .pull(|a, _, by| {
+        let n = a.count(2).ok()?;
+        let (mut lo, mut hi) = (0.0, 0.0);
+        for (i, g) in by.numbers(n).into_iter().enumerate() {
+            let t = if n > 1 { i as f64 / (n - 1) as f64 } else { 0.0 };
+            lo += g * (1.0 - t);
+            hi += g * t;
+        }
+        Some(smallvec![Adjoint::Num(lo), Adjoint::Num(hi)])
+    }),
     function(
         "range",
         SECTION,
@@ -47,9 +60,14 @@ pub(super) const TABLE: &[Builtin] = &[
         Type::Array,
         "`start`, `start + step`, … before `end`; for whole numbers write `a .. b`.",
         range,
-    ),
-    function("zeros", SECTION, N, Type::Array, "An array of `n` zeros.", |a| Ok(array(a.count(0)?, |_| 0.0))),
-    function("ones", SECTION, N, Type::Array, "An array of `n` ones.", |a| Ok(array(a.count(0)?, |_| 1.0))),
+    )
+    .pull(|_, y, by| {
+        let g = by.numbers(y.len()?);
+        let step = g.iter().enumerate().map(|(i, g)| i as f64 * g).sum();
+        Some(smallvec![Adjoint::Num(g.iter().sum()), Adjoint::Zero, Adjoint::Num(step)])
+    }),
+    function("zeros", SECTION, N, Type::Array, "An array of `n` zeros.", |a| Ok(array(a.count(0)?, |_| 0.0))).flat(),
+    function("ones", SECTION, N, Type::Array, "An array of `n` ones.", |a| Ok(array(a.count(0)?, |_| 1.0))).flat(),
     function(
         "fill",
         SECTION,
@@ -60,7 +78,12 @@ pub(super) const TABLE: &[Builtin] = &[
             Value::Num(x) => Ok(array(a.count(1)?, |_| *x)),
             x => Ok(Value::from_elements(vec![x.clone(); a.count(1)?])),
         },
-    ),
+    )
+    .pull(|_, y, by| {
+        let mut sum = Adjoint::Zero;
+        (0..y.len()?).for_each(|i| sum.add(by.element(i)));
+        Some(smallvec![sum])
+    }),
     function(
         "concat",
         SECTION,
@@ -69,7 +92,8 @@ pub(super) const TABLE: &[Builtin] = &[
         "The arguments joined end to end.",
         concat,
     )
-    .variadic(),
+    .variadic()
+    .pull(pull_concat),
     function(
         "append",
         SECTION,
@@ -81,27 +105,44 @@ pub(super) const TABLE: &[Builtin] = &[
             xs.push(a.get(1).clone());
             Ok(Value::from_elements(xs))
         },
-    ),
+    )
+    .pull(|a, y, by| {
+        let n = y.len()?.saturating_sub(1);
+        Some(smallvec![moved(a.get(0), by, |i| i), by.element(n)])
+    }),
     function("reverse", SECTION, XS, Type::Array, "The elements from the last to the first.", |a| {
         let mut xs = a.elements(0)?.into_owned();
         xs.reverse();
         Ok(Value::from_elements(xs))
+    })
+    .pull(|a, y, by| {
+        let n = y.len()?;
+        Some(smallvec![moved(a.get(0), by, |i| n - 1 - i)])
     }),
     function("sort", SECTION, XS, Type::Array, "Numbers or strings in ascending order, NaN last.", |a| {
         let xs = a.elements(0)?;
         let order = sorted(a, &xs)?;
         Ok(Value::from_elements(order.into_iter().filter_map(|i| xs.get(i).cloned()).collect()))
+    })
+    .pull(|a, _, by| {
+        let order = sorted(a, &a.elements(0).ok()?).ok()?;
+        let mut sum = Adjoint::Zero;
+        order.iter().enumerate().for_each(|(to, from)| sum.add_element(order.len(), *from, by.element(to)));
+        Some(smallvec![sum])
     }),
     function("argsort", SECTION, XS, Type::Array, "The positions of the elements in ascending order.", |a| {
         let xs = a.elements(0)?;
         Ok(Value::array(sorted(a, &xs)?.into_iter().map(|i| i as f64).collect::<Vec<_>>()))
-    }),
+    })
+    .flat(),
     function("argmax", SECTION, XS, Type::Int, "The position of the largest number, the first of equals.", |a| {
         best(a, |x, best| x > best)
-    }),
+    })
+    .flat(),
     function("argmin", SECTION, XS, Type::Int, "The position of the smallest number, the first of equals.", |a| {
         best(a, |x, best| x < best)
-    }),
+    })
+    .flat(),
     function(
         "zip",
         SECTION,
@@ -116,15 +157,30 @@ pub(super) const TABLE: &[Builtin] = &[
             let pair = |(x, y): (&Value, &Value)| Value::from_elements(vec![x.clone(), y.clone()]);
             Ok(Value::List(xs.iter().zip(ys.iter()).map(pair).collect()))
         },
-    ),
+    )
+    .pull(|_, z, by| {
+        let n = z.len()?;
+        let side = |k: usize| {
+            let mut all = Adjoint::Zero;
+            (0..n).for_each(|i| all.add_element(n, i, by.element(i).element(k)));
+            all
+        };
+        Some(smallvec![side(0), side(1)])
+    }),
     function("keys", SECTION, FIELDS, Type::Array, "The names of the fields in order.", |a| match a.get(0) {
         Value::Record(r) => Ok(Value::List(r.keys().map(|k| Value::Str(Arc::clone(k))).collect())),
         v => Ok(array(array_len(v).ok_or_else(|| a.wrong(0, "a record or array"))?, |i| i as f64)),
-    }),
+    })
+    .flat(),
     function("values", SECTION, FIELDS, Type::Array, "The values of the fields in order.", |a| match a.get(0) {
         Value::Record(r) => Ok(Value::from_elements(r.values().cloned().collect())),
         v if array_len(v).is_some() => Ok(v.clone()),
         _ => Err(a.wrong(0, "a record or array")),
+    })
+    .pull(|a, _, by| {
+        let mut all = Adjoint::Zero;
+        (0..a.get(0).len()?).for_each(|i| all.add_position(a.get(0), i, by.element(i)));
+        Some(smallvec![all])
     }),
     function(
         "has",
@@ -143,13 +199,16 @@ pub(super) const TABLE: &[Builtin] = &[
                 _ => Err(a.wrong(0, "a record or array")),
             },
         },
-    ),
+    )
+    .flat(),
     function("any", SECTION, BOOLS, Type::Bool, "Whether one element at least is true.", |a| {
         Ok(Value::Bool(bools(a)?.contains(&true)))
-    }),
+    })
+    .flat(),
     function("all", SECTION, BOOLS, Type::Bool, "Whether every element is true.", |a| {
         Ok(Value::Bool(!bools(a)?.contains(&false)))
-    }),
+    })
+    .flat(),
     function(
         "select",
         SECTION,
@@ -161,7 +220,11 @@ pub(super) const TABLE: &[Builtin] = &[
         Type::Any,
         "`a` where the condition is true, `b` where it is not, element by element; both are always computed.",
         |a| select(a, a.get(0), a.get(1), a.get(2)),
-    ),
+    )
+    .pull(|a, z, by| {
+        let [x, y] = pull_select(a.get(0), a.get(1), a.get(2), z, by)?;
+        Some(smallvec![Adjoint::Zero, x, y])
+    }),
     function(
         "str",
         SECTION,
@@ -172,7 +235,8 @@ pub(super) const TABLE: &[Builtin] = &[
             s @ Value::Str(_) => Ok(s.clone()),
             v => Ok(Value::Str(v.to_string().into())),
         },
-    ),
+    )
+    .flat(),
 ];
 
 fn len(a: &Args) -> Result<Value, Fault> {
@@ -231,6 +295,42 @@ fn concat(a: &Args) -> Result<Value, Fault> {
         all.extend(a.elements(i)?.iter().cloned());
     }
     Ok(Value::from_elements(all))
+}
+
+/// The adjoint of an array whose element `i` became element `to(i)`.
+fn moved(xs: &Value, by: &Adjoint, to: impl Fn(usize) -> usize) -> Adjoint {
+    let n = xs.len().unwrap_or(0);
+    let mut all = Adjoint::Zero;
+    (0..n).for_each(|i| all.add_element(n, i, by.element(to(i))));
+    all
+}
+
+fn pull_concat(a: &Args, _: &Value, by: &Adjoint) -> Option<Pulled> {
+    let mut from = 0;
+    let part = |v: &&Value| {
+        let (n, start) = (array_len(v).unwrap_or(0), from);
+        from += n;
+        match by {
+            Adjoint::Array(gs) => gs.get(start..start + n).map_or(Adjoint::Zero, |g| Adjoint::Array(g.to_vec())),
+            by => moved(v, by, |i| start + i),
+        }
+    };
+    Some(a.values.iter().map(part).collect())
+}
+
+fn pull_select(cond: &Value, x: &Value, y: &Value, z: &Value, by: &Adjoint) -> Option<[Adjoint; 2]> {
+    if let Value::Bool(b) = cond {
+        return Some(if *b { [by.clone(), Adjoint::Zero] } else { [Adjoint::Zero, by.clone()] });
+    }
+    let n = array_len(cond)?;
+    let mut both = [Adjoint::Zero, Adjoint::Zero];
+    for i in 0..n {
+        let parts = pull_select(&part(cond, i), &part(x, i), &part(y, i), &z.element(i)?, &by.element(i))?;
+        for ((sum, v), one) in both.iter_mut().zip([x, y]).zip(parts) {
+            if array_len(v).is_some() { sum.add_element(n, i, one) } else { sum.add(one) }
+        }
+    }
+    Some(both)
 }
 
 /// The positions in ascending order, equals in the order they had.

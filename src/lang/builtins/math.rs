@@ -2,7 +2,9 @@
 
 use super::elementwise::{binary, numeric, unary};
 use super::reduce::{largest, smallest};
-use super::{Arg, Args, Builtin, Type, arg, function};
+use super::derivative::{self, of_two, one_of};
+use super::{Arg, Args, Builtin, Pull, Pulled, Type, arg, function};
+use crate::lang::adjoint::Adjoint;
 use crate::lang::error::Fault;
 use crate::lang::value::Value;
 
@@ -11,20 +13,30 @@ const SECTION: &str = "Math";
 const X: &[Arg] = &[arg("x", Type::Nums, "The argument.")];
 const ANGLE: &[Arg] = &[arg("x", Type::Nums, "An angle.").unit("radians")];
 
-const fn of_x(name: &'static str, doc: &'static str, f: fn(&Args) -> Result<Value, Fault>) -> Builtin {
-    function(name, SECTION, X, Type::Nums, doc, f)
+const fn of_x(name: &'static str, doc: &'static str, f: fn(&Args) -> Result<Value, Fault>, pull: Pull) -> Builtin {
+    function(name, SECTION, X, Type::Nums, doc, f).pull(pull)
 }
 
-const fn of_angle(name: &'static str, doc: &'static str, f: fn(&Args) -> Result<Value, Fault>) -> Builtin {
-    function(name, SECTION, ANGLE, Type::Nums, doc, f)
+/// Constant between jumps.
+const fn steps(name: &'static str, doc: &'static str, f: fn(&Args) -> Result<Value, Fault>) -> Builtin {
+    function(name, SECTION, X, Type::Nums, doc, f).flat()
+}
+
+const fn of_angle(
+    name: &'static str,
+    doc: &'static str,
+    f: fn(&Args) -> Result<Value, Fault>,
+    pull: Pull,
+) -> Builtin {
+    function(name, SECTION, ANGLE, Type::Nums, doc, f).pull(pull)
 }
 
 pub(super) const TABLE: &[Builtin] = &[
-    of_x("exp", "The exponential.", |a| unary(a, libm::exp)),
-    of_x("expm1", "`exp(x) - 1`, accurate near 0.", |a| unary(a, libm::expm1)),
-    of_x("log", "The natural logarithm; -inf at 0, NaN below.", |a| unary(a, libm::log)),
-    of_x("log1p", "`log(1 + x)`, accurate near 0.", |a| unary(a, libm::log1p)),
-    of_x("sqrt", "The square root; NaN below 0.", |a| unary(a, f64::sqrt)),
+    of_x("exp", "The exponential.", |a| unary(a, libm::exp), |a, y, by| derivative::unary(a, y, by, |_, y| y)),
+    of_x("expm1", "`exp(x) - 1`, accurate near 0.", |a| unary(a, libm::expm1), |a, y, by| derivative::unary(a, y, by, |_, y| y + 1.0)),
+    of_x("log", "The natural logarithm; -inf at 0, NaN below.", |a| unary(a, libm::log), |a, y, by| derivative::unary(a, y, by, |x, _| 1.0 / x)),
+    of_x("log1p", "`log(1 + x)`, accurate near 0.", |a| unary(a, libm::log1p), |a, y, by| derivative::unary(a, y, by, |x, _| 1.0 / (1.0 + x))),
+    of_x("sqrt", "The square root; NaN below 0.", |a| unary(a, f64::sqrt), |a, y, by| derivative::unary(a, y, by, |_, y| 0.5 / y)),
     function(
         "pow",
         SECTION,
@@ -32,13 +44,14 @@ pub(super) const TABLE: &[Builtin] = &[
         Type::Nums,
         "`x ** y`.",
         |a| binary(a, libm::pow),
-    ),
-    of_x("abs", "The absolute value.", |a| unary(a, f64::abs)),
-    of_x("sign", "-1, 0 or 1.", |a| unary(a, sign)),
-    of_x("step", "0 below 0, 1 from 0 on.", |a| unary(a, step)),
-    of_x("floor", "The next whole number below.", |a| unary(a, libm::floor)),
-    of_x("ceil", "The next whole number above.", |a| unary(a, libm::ceil)),
-    of_x("round", "The nearest whole number, halves away from 0.", |a| unary(a, libm::round)),
+    )
+    .pull(|a, z, by| of_two(a, z, by, pow_slopes)),
+    of_x("abs", "The absolute value.", |a| unary(a, f64::abs), |a, y, by| derivative::unary(a, y, by, |x, _| sign(x))),
+    steps("sign", "-1, 0 or 1.", |a| unary(a, sign)),
+    steps("step", "0 below 0, 1 from 0 on.", |a| unary(a, step)),
+    steps("floor", "The next whole number below.", |a| unary(a, libm::floor)),
+    steps("ceil", "The next whole number above.", |a| unary(a, libm::ceil)),
+    steps("round", "The nearest whole number, halves away from 0.", |a| unary(a, libm::round)),
     function(
         "min",
         SECTION,
@@ -47,7 +60,8 @@ pub(super) const TABLE: &[Builtin] = &[
         "The smallest element of one array, or of several arguments element by element; NaN if one is NaN.",
         |a| extreme(a, smaller, smallest),
     )
-    .variadic(),
+    .variadic()
+    .pull(pull_extreme),
     function(
         "max",
         SECTION,
@@ -56,7 +70,8 @@ pub(super) const TABLE: &[Builtin] = &[
         "The largest element of one array, or of several arguments element by element; NaN if one is NaN.",
         |a| extreme(a, larger, largest),
     )
-    .variadic(),
+    .variadic()
+    .pull(pull_extreme),
     function(
         "clamp",
         SECTION,
@@ -68,13 +83,15 @@ pub(super) const TABLE: &[Builtin] = &[
         Type::Nums,
         "`x` moved into the interval from `lo` to `hi`.",
         clamp,
-    ),
-    of_angle("sin", "The sine.", |a| unary(a, libm::sin)),
-    of_angle("cos", "The cosine.", |a| unary(a, libm::cos)),
-    of_angle("tan", "The tangent.", |a| unary(a, libm::tan)),
-    of_x("asin", "The angle in [-pi/2, pi/2] with this sine.", |a| unary(a, libm::asin)),
-    of_x("acos", "The angle in [0, pi] with this cosine.", |a| unary(a, libm::acos)),
-    of_x("atan", "The angle in (-pi/2, pi/2) with this tangent.", |a| unary(a, libm::atan)),
+    )
+    // The bounds first, of which the upper one wins: at a bound the argument moves nothing.
+    .pull(|a, z, by| one_of(a.values, &[2, 1, 0], z, by)),
+    of_angle("sin", "The sine.", |a| unary(a, libm::sin), |a, y, by| derivative::unary(a, y, by, |x, _| libm::cos(x))),
+    of_angle("cos", "The cosine.", |a| unary(a, libm::cos), |a, y, by| derivative::unary(a, y, by, |x, _| -libm::sin(x))),
+    of_angle("tan", "The tangent.", |a| unary(a, libm::tan), |a, y, by| derivative::unary(a, y, by, |_, y| 1.0 + y * y)),
+    of_x("asin", "The angle in [-pi/2, pi/2] with this sine.", |a| unary(a, libm::asin), |a, y, by| derivative::unary(a, y, by, |x, _| 1.0 / (1.0 - x * x).sqrt())),
+    of_x("acos", "The angle in [0, pi] with this cosine.", |a| unary(a, libm::acos), |a, y, by| derivative::unary(a, y, by, |x, _| -1.0 / (1.0 - x * x).sqrt())),
+    of_x("atan", "The angle in (-pi/2, pi/2) with this tangent.", |a| unary(a, libm::atan), |a, y, by| derivative::unary(a, y, by, |x, _| 1.0 / (1.0 + x * x))),
     function(
         "atan2",
         SECTION,
@@ -82,10 +99,16 @@ pub(super) const TABLE: &[Builtin] = &[
         Type::Nums,
         "The angle of the point (x, y) in [-pi, pi], in radians.",
         |a| binary(a, libm::atan2),
-    ),
-    of_x("sinh", "The hyperbolic sine.", |a| unary(a, libm::sinh)),
-    of_x("cosh", "The hyperbolic cosine.", |a| unary(a, libm::cosh)),
-    of_x("tanh", "The hyperbolic tangent.", |a| unary(a, libm::tanh)),
+    )
+    .pull(|a, z, by| {
+        of_two(a, z, by, |y, x, _| {
+            let square = x * x + y * y;
+            [x / square, -y / square]
+        })
+    }),
+    of_x("sinh", "The hyperbolic sine.", |a| unary(a, libm::sinh), |a, y, by| derivative::unary(a, y, by, |x, _| libm::cosh(x))),
+    of_x("cosh", "The hyperbolic cosine.", |a| unary(a, libm::cosh), |a, y, by| derivative::unary(a, y, by, |x, _| libm::sinh(x))),
+    of_x("tanh", "The hyperbolic tangent.", |a| unary(a, libm::tanh), |a, y, by| derivative::unary(a, y, by, |_, y| 1.0 - y * y)),
     function(
         "deg",
         SECTION,
@@ -93,12 +116,31 @@ pub(super) const TABLE: &[Builtin] = &[
         Type::Nums,
         "Degrees in radians: `deg(180)` is pi.",
         |a| unary(a, |x| x * (std::f64::consts::PI / 180.0)),
-    ),
-    of_x("logit", "`log(p / (1 - p))`, for probabilities.", |a| unary(a, logit)),
-    of_x("expit", "`1 / (1 + exp(-x))`, the inverse of `logit`.", |a| unary(a, expit)),
-    of_x("erf", "The error function.", |a| unary(a, libm::erf)),
-    of_x("lgamma", "The logarithm of the absolute value of the gamma function.", |a| unary(a, libm::lgamma)),
+    )
+    .pull(|a, y, by| derivative::unary(a, y, by, |_, _| std::f64::consts::PI / 180.0)),
+    of_x("logit", "`log(p / (1 - p))`, for probabilities.", |a| unary(a, logit), |a, y, by| derivative::unary(a, y, by, |x, _| 1.0 / (x * (1.0 - x)))),
+    of_x("expit", "`1 / (1 + exp(-x))`, the inverse of `logit`.", |a| unary(a, expit), |a, y, by| derivative::unary(a, y, by, |_, y| y * (1.0 - y))),
+    of_x("erf", "The error function.", |a| unary(a, libm::erf), |a, y, by| derivative::unary(a, y, by, |x, _| std::f64::consts::FRAC_2_SQRT_PI * libm::exp(-x * x))),
+    of_x("lgamma", "The logarithm of the absolute value of the gamma function.", |a| unary(a, libm::lgamma), |a, y, by| derivative::unary(a, y, by, |x, _| crate::num::digamma(x))),
 ];
+
+/// The derivatives of x^y.
+pub(super) fn pow_slopes(x: f64, y: f64, z: f64) -> [f64; 2] {
+    // A base of 0 has no logarithm, and x^y does not move with y there.
+    [if y == 0.0 { 0.0 } else { y * libm::pow(x, y - 1.0) }, if z == 0.0 { 0.0 } else { z * libm::log(x) }]
+}
+
+fn pull_extreme(a: &Args, z: &Value, by: &Adjoint) -> Option<Pulled> {
+    if a.values.len() > 1 {
+        let order: Vec<usize> = (0..a.values.len()).collect();
+        return one_of(a.values, &order, z, by);
+    }
+    let Value::Array(xs) = a.get(0) else { return Some(smallvec::smallvec![by.clone()]) };
+    let Value::Num(z) = z else { return None };
+    let mut all = Adjoint::Zero;
+    all.add_element(xs.len(), xs.iter().position(|x| x == z)?, by.clone());
+    Some(smallvec::smallvec![all])
+}
 
 fn sign(x: f64) -> f64 {
     if x > 0.0 {

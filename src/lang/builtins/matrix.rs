@@ -4,9 +4,11 @@
 
 use super::elementwise::array;
 use super::reduce::dot;
-use super::{Args, Builtin, Type, arg, function};
+use super::{Args, Builtin, Pulled, Type, arg, function};
+use crate::lang::adjoint::Adjoint;
 use crate::lang::error::Fault;
 use crate::lang::value::Value;
+use smallvec::smallvec;
 use std::borrow::Cow;
 
 const SECTION: &str = "Matrices";
@@ -22,7 +24,8 @@ pub(super) const TABLE: &[Builtin] = &[
         Type::Any,
         "The matrix product; a vector gives a vector, two vectors their dot product.",
         matmul,
-    ),
+    )
+    .pull(pull_matmul),
     function(
         "transpose",
         SECTION,
@@ -33,7 +36,12 @@ pub(super) const TABLE: &[Builtin] = &[
             let m = Matrix::read(a, 0)?;
             Ok(m.transposed().into_value())
         },
-    ),
+    )
+    .pull(|a, _, by| {
+        let m = Matrix::read(a, 0).ok()?;
+        let g = Matrix::of(by, m.width, m.rows.len());
+        Some(smallvec![g.transposed().into_adjoint()])
+    }),
     function(
         "diag",
         SECTION,
@@ -47,7 +55,19 @@ pub(super) const TABLE: &[Builtin] = &[
                 Ok(array(m.rows.len().min(m.width), |i| m.rows[i][i]))
             }
         },
-    ),
+    )
+    .pull(|a, _, by| match a.get(0) {
+        Value::Array(xs) => {
+            let g = Matrix::of(by, xs.len(), xs.len());
+            Some(smallvec![Adjoint::Array((0..xs.len()).map(|i| g.rows[i][i]).collect())])
+        }
+        _ => {
+            let m = Matrix::read(a, 0).ok()?;
+            let g = by.numbers(m.rows.len().min(m.width));
+            let entry = |i: usize, j: usize| if i == j { g[i] } else { 0.0 };
+            Some(smallvec![Matrix::from_fn(m.rows.len(), m.width, entry).into_adjoint()])
+        }
+    }),
     function(
         "outer",
         SECTION,
@@ -58,7 +78,14 @@ pub(super) const TABLE: &[Builtin] = &[
             let (xs, ys) = (a.numbers(0)?, a.numbers(1)?);
             Ok(rows(xs.len(), |i| array(ys.len(), |j| xs[i] * ys[j])))
         },
-    ),
+    )
+    .pull(|a, _, by| {
+        let (xs, ys) = (a.numbers(0).ok()?, a.numbers(1).ok()?);
+        let g = Matrix::of(by, xs.len(), ys.len());
+        let by_xs = g.rows.iter().map(|r| dot(r, &ys)).collect();
+        let by_ys = g.transposed().rows.iter().map(|c| dot(c, &xs)).collect();
+        Some(smallvec![Adjoint::Array(by_xs), Adjoint::Array(by_ys)])
+    }),
     function(
         "identity",
         SECTION,
@@ -69,7 +96,8 @@ pub(super) const TABLE: &[Builtin] = &[
             let n = a.int_in(0, 0, 3000)? as usize;
             Ok(rows(n, |i| array(n, |j| f64::from(u8::from(i == j)))))
         },
-    ),
+    )
+    .flat(),
 ];
 
 /// Rows of equal length, borrowed from a value.
@@ -105,6 +133,20 @@ impl<'a> Matrix<'a> {
         Matrix { rows: (0..self.width).map(column).collect(), width: self.rows.len() }
     }
 
+    fn from_fn(rows: usize, width: usize, entry: impl Fn(usize, usize) -> f64) -> Matrix<'static> {
+        let row = |i: usize| Cow::Owned((0..width).map(|j| entry(i, j)).collect());
+        Matrix { rows: (0..rows).map(row).collect(), width }
+    }
+
+    /// The derivatives by a matrix of this size.
+    fn of(by: &Adjoint, rows: usize, width: usize) -> Matrix<'static> {
+        Matrix { rows: (0..rows).map(|i| Cow::Owned(by.element(i).numbers(width))).collect(), width }
+    }
+
+    fn into_adjoint(self) -> Adjoint {
+        Adjoint::List(self.rows.into_iter().map(|r| Adjoint::Array(r.into_owned())).collect())
+    }
+
     fn into_value(self) -> Value {
         Value::List(self.rows.into_iter().map(|r| Value::array(r.into_owned())).collect())
     }
@@ -129,6 +171,32 @@ fn matmul(a: &Args) -> Result<Value, Fault> {
         (false, true) => array(left.rows.len(), |i| cell(i, 0)),
         (false, false) => rows(left.rows.len(), |i| array(right.rows.len(), |j| cell(i, j))),
     })
+}
+
+/// With C = A B: by A it is G B', by B it is A' G.
+fn pull_matmul(a: &Args, _: &Value, by: &Adjoint) -> Option<Pulled> {
+    let is_vector = |i: usize| matches!(a.get(i), Value::Array(_));
+    let left = if is_vector(0) { single_row(a, 0).ok()? } else { Matrix::read(a, 0).ok()? };
+    // Its columns.
+    let right = if is_vector(1) { single_row(a, 1).ok()? } else { Matrix::read(a, 1).ok()?.transposed() };
+    let (n, m, inner) = (left.rows.len(), right.rows.len(), left.width);
+    let g = match (is_vector(0), is_vector(1)) {
+        (true, true) => Matrix::from_fn(1, 1, |_, _| by.number()),
+        (true, false) => Matrix { rows: vec![Cow::Owned(by.numbers(m))], width: m },
+        (false, true) => {
+            let column = by.numbers(n);
+            Matrix::from_fn(n, 1, |i, _| column[i])
+        }
+        (false, false) => Matrix::of(by, n, m),
+    };
+    let by_left = Matrix::from_fn(n, inner, |i, k| (0..m).map(|j| g.rows[i][j] * right.rows[j][k]).sum());
+    // As columns, too.
+    let by_right = Matrix::from_fn(m, inner, |j, k| (0..n).map(|i| g.rows[i][j] * left.rows[i][k]).sum());
+    let row = |m: Matrix| Adjoint::Array(m.rows.into_iter().next().map(Cow::into_owned).unwrap_or_default());
+    Some(smallvec![
+        if is_vector(0) { row(by_left) } else { by_left.into_adjoint() },
+        if is_vector(1) { row(by_right) } else { by_right.transposed().into_adjoint() },
+    ])
 }
 
 fn single_row<'a>(a: &Args<'a>, i: usize) -> Result<Matrix<'a>, Fault> {

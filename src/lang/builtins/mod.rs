@@ -6,6 +6,7 @@
 mod args;
 mod covariance;
 pub mod data;
+mod derivative;
 mod distributions;
 pub mod doc;
 mod elementwise;
@@ -21,6 +22,7 @@ pub mod scene;
 mod table;
 
 pub use args::Args;
+pub use derivative::{Derivative, Pull, Pulled};
 pub use table::{Constant, Table};
 
 use super::error::Fault;
@@ -162,6 +164,8 @@ pub struct Builtin {
     pub doc: &'static str,
     /// What it is.
     pub kind: Kind,
+    /// Its derivative.
+    pub derivative: Derivative,
 }
 
 /// A pure function of the language's own namespace.
@@ -173,7 +177,17 @@ const fn function(
     doc: &'static str,
     f: fn(&Args) -> Result<Value, Fault>,
 ) -> Builtin {
-    Builtin { name, module: "", section, args, variadic: false, returns, doc, kind: Kind::Function(f) }
+    Builtin {
+        name,
+        module: "",
+        section,
+        args,
+        variadic: false,
+        returns,
+        doc,
+        kind: Kind::Function(f),
+        derivative: Derivative::Unknown,
+    }
 }
 
 impl fmt::Debug for Builtin {
@@ -186,6 +200,16 @@ impl Builtin {
     /// The same with a last argument that may be given any number of times.
     const fn variadic(self) -> Builtin {
         Builtin { variadic: true, ..self }
+    }
+
+    /// The same with its vector-Jacobian product.
+    const fn pull(self, f: Pull) -> Builtin {
+        Builtin { derivative: Derivative::Product(f), ..self }
+    }
+
+    /// The same, with a derivative of zero wherever there is one.
+    const fn flat(self) -> Builtin {
+        Builtin { derivative: Derivative::Zero, ..self }
     }
 
     /// Whether this version only checks and documents it, and cannot run it yet.

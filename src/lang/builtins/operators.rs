@@ -4,7 +4,9 @@
 
 use super::args::MAX_ELEMENTS;
 use super::covariance::CovarianceValue;
+use super::derivative::{self, of_two};
 use super::elementwise::{array, array_len, broadcast, numeric, unary};
+use super::math::pow_slopes;
 use super::{Arg, Args, Builtin, Type, arg, function};
 use crate::lang::error::Fault;
 use crate::lang::value::Value;
@@ -19,19 +21,28 @@ const fn infix(name: &'static str, returns: Type, doc: &'static str, f: fn(&Args
 }
 
 pub(super) const TABLE: &[Builtin] = &[
-    infix("+", Type::Any, "Sum of numbers, element by element; joins two strings; adds covariances.", add),
-    infix("-", Type::Nums, "Difference, element by element.", |a| arithmetic(a, |x, y| x - y)),
+    infix("+", Type::Any, "Sum of numbers, element by element; joins two strings; adds covariances.", add)
+        .pull(|a, z, by| of_two(a, z, by, |_, _, _| [1.0, 1.0])),
+    infix("-", Type::Nums, "Difference, element by element.", |a| arithmetic(a, |x, y| x - y))
+        .pull(|a, z, by| of_two(a, z, by, |_, _, _| [1.0, -1.0])),
     infix(
         "*",
         Type::Any,
         "Product of numbers, element by element; applies a placement to a solid; multiplies covariances.",
         multiply,
-    ),
+    )
+    .pull(|a, z, by| match (a.get(0), z) {
+        (Value::Object(o), Value::Object(_)) => o.pull_product(a.get(1), by).map(|both| both.into_iter().collect()),
+        _ => of_two(a, z, by, |x, y, _| [y, x]),
+    }),
     infix("/", Type::Nums, "Quotient, element by element; by zero it is an infinity or NaN.", |a| {
         arithmetic(a, |x, y| x / y)
-    }),
-    infix("%", Type::Nums, "Remainder with the sign of the divisor: `-1 % 3` is 2.", |a| arithmetic(a, remainder)),
-    infix("**", Type::Nums, "Power, element by element.", |a| arithmetic(a, libm::pow)),
+    })
+    .pull(|a, z, by| of_two(a, z, by, |_, y, z| [1.0 / y, -z / y])),
+    infix("%", Type::Nums, "Remainder with the sign of the divisor: `-1 % 3` is 2.", |a| arithmetic(a, remainder))
+        .pull(|a, z, by| of_two(a, z, by, |x, y, _| [1.0, -libm::floor(x / y)])),
+    infix("**", Type::Nums, "Power, element by element.", |a| arithmetic(a, libm::pow))
+        .pull(|a, z, by| of_two(a, z, by, pow_slopes)),
     function(
         "neg",
         SECTION,
@@ -39,7 +50,8 @@ pub(super) const TABLE: &[Builtin] = &[
         Type::Nums,
         "Negation `-a`, element by element.",
         negate,
-    ),
+    )
+    .pull(|a, y, by| derivative::unary(a, y, by, |_, _| -1.0)),
     function(
         "not",
         SECTION,
@@ -47,18 +59,20 @@ pub(super) const TABLE: &[Builtin] = &[
         Type::Any,
         "Logical negation, element by element.",
         not,
-    ),
+    )
+    .flat(),
     infix(
         "==",
         Type::Any,
         "Equality of any two values; arrays are compared element by element (`all(a == b)` is one bool).",
         |a| equality(a, true),
-    ),
-    infix("!=", Type::Any, "The opposite of `==`.", |a| equality(a, false)),
-    infix("<", Type::Any, "Order of numbers or strings, element by element.", |a| compare(a, Ordering::is_lt)),
-    infix("<=", Type::Any, "Order of numbers or strings, element by element.", |a| compare(a, Ordering::is_le)),
-    infix(">", Type::Any, "Order of numbers or strings, element by element.", |a| compare(a, Ordering::is_gt)),
-    infix(">=", Type::Any, "Order of numbers or strings, element by element.", |a| compare(a, Ordering::is_ge)),
+    )
+    .flat(),
+    infix("!=", Type::Any, "The opposite of `==`.", |a| equality(a, false)).flat(),
+    infix("<", Type::Any, "Order of numbers or strings, element by element.", |a| compare(a, Ordering::is_lt)).flat(),
+    infix("<=", Type::Any, "Order of numbers or strings, element by element.", |a| compare(a, Ordering::is_le)).flat(),
+    infix(">", Type::Any, "Order of numbers or strings, element by element.", |a| compare(a, Ordering::is_gt)).flat(),
+    infix(">=", Type::Any, "Order of numbers or strings, element by element.", |a| compare(a, Ordering::is_ge)).flat(),
     function(
         "..",
         SECTION,
@@ -69,7 +83,8 @@ pub(super) const TABLE: &[Builtin] = &[
         Type::Array,
         "The whole numbers from `lo` up to but not including `hi`.",
         range,
-    ),
+    )
+    .flat(),
 ];
 
 fn add(a: &Args) -> Result<Value, Fault> {

@@ -344,7 +344,7 @@ impl Graph {
         }
     }
 
-    fn is_whitened(&self, n: NodeId) -> bool {
+    pub(crate) fn is_whitened(&self, n: NodeId) -> bool {
         matches!(self.nodes[n as usize].side.as_deref(), Some(Side::Choice(ChoiceSide { stored: Some(_), .. })))
     }
 

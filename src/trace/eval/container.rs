@@ -351,7 +351,7 @@ impl Graph {
     }
 
     /// How many keys an element of a container has.
-    fn key_width(&self, code: &Code, container: NodeId) -> usize {
+    pub(crate) fn key_width(&self, code: &Code, container: NodeId) -> usize {
         match self.op(code, container) {
             Op::Container { sources, .. } => sources[0].keys.len(),
             _ => 1,

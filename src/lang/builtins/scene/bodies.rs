@@ -3,10 +3,12 @@
 use super::shapes::vector_of;
 use super::{ARMATURE, AffineValue, ArmatureValue, SOLID, SolidValue, fault, native};
 use crate::geom::armature::{Armature, JointPose, Rules, Stretch, Turn, autorig};
-use crate::lang::builtins::{Args, Builtin, Type, arg, opt};
+use crate::lang::adjoint::Adjoint;
+use crate::lang::builtins::{Args, Builtin, Pulled, Type, arg, opt};
 use crate::lang::error::Fault;
 use crate::lang::value::{Record, Value};
 use glam::{DMat3, DVec3};
+use smallvec::smallvec;
 use std::sync::Arc;
 
 const SECTION: &str = "Bodies";
@@ -38,7 +40,8 @@ pub(super) const TABLE: &[Builtin] = &[
             let pose = pose(a, body)?;
             body.posed(&pose, &rules).map(|s| Value::object(SolidValue(s))).map_err(fault)
         },
-    ),
+    )
+    .pull(pull_skin),
     native(
         "shaped",
         SECTION,
@@ -62,7 +65,8 @@ pub(super) const TABLE: &[Builtin] = &[
             }
             body.shaped(&list).map(|b| Value::object(ArmatureValue(Arc::new(b)))).map_err(fault)
         },
-    ),
+    )
+    .pull(pull_shaped),
     native(
         "stretched",
         SECTION,
@@ -123,6 +127,34 @@ pub(super) const TABLE: &[Builtin] = &[
         },
     ),
 ];
+
+/// Of poses that are one array of rotation vectors.
+fn pull_skin(a: &Args, _: &Value, by: &Adjoint) -> Option<Pulled> {
+    let body = armature(a).ok()?;
+    let Value::Array(numbers) = a.get(1) else { return None };
+    let rules = Rules { stops: stops(a, body).ok()?, inherit_scale: a.bool_or(3, false).ok()? };
+    let g = body.pull_keypoints(&pose(a, body).ok()?, &rules, &vectors(by, body.rig().keypoints().len())).ok()??;
+    let flat = |all: &[DVec3]| all.iter().flat_map(DVec3::to_array).collect::<Vec<f64>>();
+    let rest = [flat(&g.heads), flat(&g.keypoints)].concat();
+    let turns = if numbers.is_empty() { Adjoint::Zero } else { Adjoint::Array(flat(&g.turns)) };
+    Some(smallvec![Adjoint::Array(rest), turns])
+}
+
+fn pull_shaped(a: &Args, _: &Value, by: &Adjoint) -> Option<Pulled> {
+    let body = armature(a).ok()?;
+    let Value::Record(amounts) = a.get(1) else { return None };
+    let (heads, points) = (body.rig().joints().len(), body.rig().keypoints().len());
+    let all = vectors(by, heads + points);
+    let names: Vec<&str> = amounts.keys().map(|k| &**k).collect();
+    let slopes = body.pull_morphs(&names, &all[..heads], &all[heads..]).ok()?;
+    let fields = amounts.keys().zip(slopes).map(|(k, g)| (Arc::clone(k), Adjoint::Num(g)));
+    // Offsets add up: what was there moves as before.
+    Some(smallvec![by.clone(), Adjoint::Record(fields.collect())])
+}
+
+fn vectors(by: &Adjoint, n: usize) -> Vec<DVec3> {
+    by.numbers(3 * n).chunks_exact(3).map(DVec3::from_slice).collect()
+}
 
 fn armature<'a>(a: &Args<'a>) -> Result<&'a Arc<Armature>, Fault> {
     a.object::<ArmatureValue>(0, BODY).map(|v| &v.0)

@@ -8,10 +8,12 @@ use super::observed::KeypointsValue;
 use super::{ViewValue, native};
 use crate::diag::nearest;
 use crate::geom::Landmark;
+use crate::lang::adjoint::Adjoint;
 use crate::lang::builtins::{Builtin, Type, opt};
 use crate::lang::value::{Likelihood, Value};
 use crate::render::{Camera, View};
 use crate::vision::keypoints::{KeypointLikelihood, KeypointOptions, matching};
+use smallvec::smallvec;
 use std::sync::Arc;
 
 pub(super) const TABLE: &[Builtin] = &[native(
@@ -31,7 +33,8 @@ pub(super) const TABLE: &[Builtin] = &[native(
         }
         likelihood(KeypointsOf { view: view(a)?, options })
     },
-)];
+)
+.pull(|_, _, by| Some(smallvec![by.clone(), Adjoint::Unknown, Adjoint::Unknown]))];
 
 #[derive(Debug)]
 struct KeypointsOf {
@@ -60,24 +63,61 @@ impl Likelihood for KeypointsOf {
     }
 
     fn log_density(&self, observed: &Value) -> Result<f64, String> {
+        let mut sum = 0.0;
+        self.each(observed, |term| sum += term.model.log_density(term.seen, term.confidence, term.joint))?;
+        Ok(sum)
+    }
+
+    /// By the x, y and z of each landmark.
+    fn gradient(&self, observed: &Value) -> Option<Adjoint> {
+        let (camera, landmarks) = (self.view.camera(), self.view.solid().landmarks());
+        let mut all = vec![0.0; 3 * landmarks.len()];
+        let add = |term: Term| {
+            let Some(joint) = term.joint else { return };
+            let by = term.model.gradient(term.seen, term.confidence, joint);
+            let by = [by[0] * term.scale[0], by[1] * term.scale[1]];
+            let g = camera.pull_point(landmarks[term.landmark].position, by);
+            all[3 * term.landmark..].iter_mut().zip(g.to_array()).for_each(|(a, g)| *a += g);
+        };
+        self.each(observed, add).ok()?;
+        Some(Adjoint::Array(all))
+    }
+}
+
+/// One detection and the landmark it is of.
+struct Term<'a> {
+    model: &'a KeypointLikelihood,
+    seen: [f64; 2],
+    confidence: f64,
+    landmark: usize,
+    /// Where the landmark is, in pixels of the picture.
+    joint: Option<[f64; 2]>,
+    /// Pixels of the picture in one of the camera's.
+    scale: [f64; 2],
+}
+
+impl KeypointsOf {
+    fn each(&self, observed: &Value, mut f: impl FnMut(Term)) -> Result<(), String> {
         let Some(KeypointsValue(seen)) = observed.downcast::<KeypointsValue>() else {
             return Err(format!("scene.keypoints: the observed value must be keypoints, got {}", observed.type_name()));
         };
         if seen.is_empty() {
-            return Ok(0.0);
+            return Ok(());
         }
         let (camera, landmarks) = (self.view.camera(), self.view.solid().landmarks());
         let size = seen.size().unwrap_or((camera.width, camera.height));
-        same_shape(size, &self.view, self.name())?;
+        same_shape(size, &self.view, "scene.keypoints")?;
         let names: Vec<&str> = landmarks.iter().map(|l| &*l.name).collect();
         let near = |name: &str, known: &[&str]| nearest(name, known.iter().copied()).map(str::to_owned);
         let found = matching(seen, &names, near).map_err(|e| format!("scene.keypoints: {e}"))?;
         let model = KeypointLikelihood::new(f64::from(size.0), f64::from(size.1), &self.options)
             .map_err(|e| format!("scene.keypoints: {e}"))?;
-        let terms = seen.points().iter().zip(found).filter_map(|(p, at)| {
-            let joint = project(landmarks.get(at?)?, camera, size);
-            Some(model.log_density(seen.position(p, size), p.confidence, joint))
-        });
-        Ok(terms.sum())
+        let scale = [f64::from(size.0) / f64::from(camera.width), f64::from(size.1) / f64::from(camera.height)];
+        for (p, at) in seen.points().iter().zip(found) {
+            let Some((landmark, l)) = at.and_then(|i| Some((i, landmarks.get(i)?))) else { continue };
+            let joint = project(l, camera, size);
+            f(Term { model: &model, seen: seen.position(p, size), confidence: p.confidence, landmark, joint, scale });
+        }
+        Ok(())
     }
 }

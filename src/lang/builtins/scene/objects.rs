@@ -2,13 +2,15 @@
 
 use crate::geom::armature::Armature;
 use crate::geom::{Affine, Solid};
+use crate::lang::adjoint::Adjoint;
 use crate::lang::index::xyz;
 use crate::lang::value::{Object, Value};
 use crate::render::{Camera, View};
+use glam::{DMat3, DVec3};
 use std::any::Any;
 use std::sync::Arc;
 
-/// A solid.
+/// A solid. Its adjoint: by each landmark's x, y and z in turn.
 #[derive(Clone, Debug)]
 pub struct SolidValue(pub Solid);
 
@@ -34,7 +36,7 @@ impl Object for SolidValue {
     }
 }
 
-/// A placement.
+/// A placement. Its adjoint: by the columns of its linear part and by its shift, twelve numbers.
 #[derive(Clone, Debug)]
 pub struct AffineValue(pub Affine);
 
@@ -56,6 +58,30 @@ impl Object for AffineValue {
         Some(Ok(Value::object(AffineValue(self.0 * other.0))))
     }
 
+    fn pull_product(&self, other: &Value, by: &Adjoint) -> Option<[Adjoint; 2]> {
+        let a = self.0.0;
+        if let Some(s) = other.downcast::<SolidValue>() {
+            let landmarks = s.0.landmarks();
+            let by = by.numbers(3 * landmarks.len());
+            let (mut linear, mut shift) = (DMat3::ZERO, DVec3::ZERO);
+            let mut inner = Vec::with_capacity(by.len());
+            for (l, g) in landmarks.iter().zip(by.chunks_exact(3)) {
+                let (p, g) = (l.position, DVec3::from_slice(g));
+                linear += DMat3::from_cols(g * p.x, g * p.y, g * p.z);
+                shift += g;
+                inner.extend((a.matrix3.transpose() * g).to_array());
+            }
+            return Some([affine_adjoint(linear, shift), Adjoint::Array(inner)]);
+        }
+        let b = other.downcast::<AffineValue>()?.0.0;
+        let by = by.numbers(12);
+        let (linear, shift) = (DMat3::from_cols_slice(&by[..9]), DVec3::from_slice(&by[9..]));
+        let t = b.translation;
+        let outer = DMat3::from_cols(shift * t.x, shift * t.y, shift * t.z);
+        let left = affine_adjoint(linear * b.matrix3.transpose() + outer, shift);
+        Some([left, affine_adjoint(a.matrix3.transpose() * linear, a.matrix3.transpose() * shift)])
+    }
+
     fn field(&self, name: &str) -> Option<Value> {
         match name {
             "translate" => Some(xyz(self.0.0.translation.to_array())),
@@ -66,7 +92,11 @@ impl Object for AffineValue {
     }
 }
 
-/// An armature: a rig with its mesh.
+pub(super) fn affine_adjoint(linear: DMat3, shift: DVec3) -> Adjoint {
+    Adjoint::Array(linear.to_cols_array().into_iter().chain(shift.to_array()).collect())
+}
+
+/// An armature: a rig with its mesh. Its adjoint: by each joint's head at rest, then by each keypoint.
 #[derive(Clone, Debug)]
 pub struct ArmatureValue(pub Arc<Armature>);
 
@@ -114,7 +144,7 @@ impl Object for CameraValue {
     }
 }
 
-/// A solid before a camera.
+/// A solid before a camera. Its adjoint is that of the solid.
 #[derive(Clone, Debug)]
 pub struct ViewValue(pub Arc<View>);
 

@@ -3,10 +3,12 @@
 use super::shapes::vector;
 use super::{CAMERA, CameraValue, SOLID, SolidValue, VIEW, ViewValue, native};
 use crate::lang::builtins::{Builtin, Type, arg, opt};
+use crate::lang::adjoint::Adjoint;
 use crate::lang::error::Fault;
 use crate::lang::value::Value;
 use crate::render::{Camera, Projection, View};
 use glam::DVec3;
+use smallvec::smallvec;
 use std::sync::Arc;
 
 const SECTION: &str = "Seeing";
@@ -63,5 +65,6 @@ pub(super) const TABLE: &[Builtin] = &[
             };
             Ok(Value::object(ViewValue(Arc::new(View::new(solid.0.clone(), camera)))))
         },
-    ),
+    )
+    .pull(|_, _, by| Some(smallvec![by.clone(), Adjoint::Unknown])),
 ];

@@ -2,10 +2,12 @@
 
 use super::{AFFINE, AffineValue, SOLID, SolidValue, fault, native};
 use crate::geom::{Affine, Caps, Landmark, Profile, Solid, cuboid, lathe, sphere};
-use crate::lang::builtins::{Args, Builtin, Type, arg, opt};
+use crate::lang::adjoint::Adjoint;
+use crate::lang::builtins::{Args, Builtin, Pulled, Type, arg, opt};
 use crate::lang::error::Fault;
 use crate::lang::value::Value;
-use glam::DVec3;
+use glam::{DMat3, DVec3};
+use smallvec::smallvec;
 use std::sync::Arc;
 
 const SECTION: &str = "Shapes";
@@ -125,11 +127,38 @@ pub(super) const TABLE: &[Builtin] = &[
             }
             Ok(Value::object(AffineValue(placed)))
         },
-    ),
+    )
+    .pull(pull_affine),
 ];
 
 fn solid(mesh: crate::geom::Mesh) -> Value {
     Value::object(SolidValue(Solid::new(Arc::new(mesh))))
+}
+
+/// Of T Rz Ry Rx S.
+fn pull_affine(a: &Args, _: &Value, by: &Adjoint) -> Option<Pulled> {
+    let (turn, scale) = (vector(a, 1, DVec3::ZERO).ok()?, vector(a, 2, DVec3::ONE).ok()?);
+    let by = by.numbers(12);
+    let (linear, shift) = (DMat3::from_cols_slice(&by[..9]), DVec3::from_slice(&by[9..]));
+    let turns = [DMat3::from_rotation_x(turn.x), DMat3::from_rotation_y(turn.y), DMat3::from_rotation_z(turn.z)];
+    let rotation = turns[2] * turns[1] * turns[0];
+    let by_scale: [f64; 3] = std::array::from_fn(|i| rotation.col(i).dot(linear.col(i)));
+    // By R: the columns of the linear part are those of R times the scale.
+    let by_rotation = DMat3::from_cols(linear.x_axis * scale.x, linear.y_axis * scale.y, linear.z_axis * scale.z);
+    let by_turn: [f64; 3] = std::array::from_fn(|i| {
+        // d R_i(angle) / d angle = [axis]x R_i.
+        let axis = DVec3::AXES[i];
+        let cross = DMat3::from_cols(axis.cross(DVec3::X), axis.cross(DVec3::Y), axis.cross(DVec3::Z));
+        let mut moved = turns;
+        moved[i] = cross * turns[i];
+        let slope = moved[2] * moved[1] * moved[0];
+        (0..3).map(|k| slope.col(k).dot(by_rotation.col(k))).sum()
+    });
+    let shaped = |i: usize, g: [f64; 3]| match a.get(i) {
+        Value::Num(_) => Adjoint::Num(g.iter().sum()),
+        _ => Adjoint::Array(g.to_vec()),
+    };
+    Some(smallvec![shaped(0, shift.to_array()), shaped(1, by_turn), shaped(2, by_scale)])
 }
 
 /// Three numbers, or one for all; a default where left out.

@@ -1,0 +1,101 @@
+//! What gradients through a trace need of distributions besides the gradient of the density: how values move with the
+//! parameters while the coordinates they are stored in stay.
+
+use super::{Datum, Dist, Support};
+use crate::rng::{Purpose, StreamKey};
+
+impl Dist {
+    /// How many derivatives by parameters [`Dist::gradient`] has: those at a draw, the same number always.
+    pub fn param_count(&self) -> usize {
+        match self {
+            Dist::Iid(d) => d.one().param_count(),
+            Dist::Product(d) => d.parts().iter().map(Dist::param_count).sum(),
+            _ => {
+                let x = self.sample(&mut StreamKey::new(0, 0, Purpose::VALUES).stream(0, 0, 0));
+                self.gradient(&x).map_or(0, |g| g.params.len())
+            }
+        }
+    }
+
+    /// Whether the support of its continuous values moves with its parameters.
+    pub fn has_moving_support(&self) -> bool {
+        match self {
+            Dist::Uniform(_) | Dist::TruncatedNormal(_) | Dist::HalfCauchy(_) => true,
+            Dist::Iid(d) => d.one().has_moving_support(),
+            Dist::Product(d) => d.parts().iter().any(Dist::has_moving_support),
+            Dist::Ordered(_) | Dist::Mixture(_) => matches!(
+                self.support(),
+                Support::Interval { .. } | Support::AtLeast { .. } | Support::AtMost { .. } | Support::Ascending(..)
+            ),
+            _ => false,
+        }
+    }
+
+    /// For a number stored as the image x(y) of an unconstrained coordinate: the derivatives by the parameters, while y stays, of
+    /// a function of x with slope `by`, plus those of log |dx/dy|. `None` where they are not known.
+    pub fn by_bounds(&self, x: &Datum, by: f64) -> Option<Vec<f64>> {
+        let x = x.num()?;
+        // By the lower and the upper bound.
+        let (lo, hi) = match self.support() {
+            // x = lo + (hi - lo) p, log |dx/dy| = log (hi - lo) + log p + log (1 - p).
+            Support::Interval { lo, hi } => {
+                let (width, p) = (hi - lo, (x - lo) / (hi - lo));
+                (by * (1.0 - p) - 1.0 / width, by * p + 1.0 / width)
+            }
+            Support::AtLeast { .. } => (by, 0.0),
+            Support::AtMost { .. } => (0.0, by),
+            _ => (0.0, 0.0),
+        };
+        match self {
+            Dist::Uniform(_) => Some(vec![lo, hi]),
+            Dist::TruncatedNormal(_) => Some(vec![0.0, 0.0, lo, hi]),
+            Dist::HalfCauchy(_) => Some(vec![lo, 0.0]),
+            d if d.has_moving_support() => None,
+            d => Some(vec![0.0; d.param_count()]),
+        }
+    }
+
+    /// For a value made from white noise, mean + L z: the derivatives by z of a function with these derivatives by the value.
+    pub fn realise_pull(&self, by: &[f64]) -> Option<Vec<f64>> {
+        match self {
+            Dist::MvNormal(d) => Some(d.pull_noise(by)),
+            Dist::Gp(d) => Some(d.pull_noise(by)),
+            _ => None,
+        }
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+    use crate::dist::{HalfCauchy, Normal, Uniform};
+
+    #[test]
+    fn bounds_move_values_as_differences_say() {
+        let (y, slope) = (0.7, 1.3);
+        // F(x) = slope x, plus the log Jacobian.
+        let f = |d: &Dist| {
+            let (x, jacobian) = d.support().from_free(&[y]);
+            slope * x.num().unwrap() + jacobian
+        };
+        let uniform = |p: [f64; 2]| Dist::Uniform(Uniform::new(p[0], p[1]).unwrap());
+        let cauchy = |p: [f64; 2]| Dist::HalfCauchy(HalfCauchy::new(p[0], p[1]).unwrap());
+        for make in [&uniform as &dyn Fn([f64; 2]) -> Dist, &cauchy] {
+            let at = [0.5, 2.0];
+            let d = make(at);
+            let (x, _) = d.support().from_free(&[y]);
+            let found = d.by_bounds(&x, slope).unwrap();
+            for i in 0..2 {
+                let moved = |h: f64| {
+                    let mut p = at;
+                    p[i] += h;
+                    f(&make(p))
+                };
+                assert!((found[i] - (moved(1e-6) - moved(-1e-6)) / 2e-6).abs() < 1e-6, "{i}: {found:?}");
+            }
+        }
+        let normal = Dist::Normal(Normal::new(0.0, 1.0).unwrap());
+        assert_eq!(normal.by_bounds(&Datum::Num(0.3), 1.0), Some(vec![0.0, 0.0]));
+        assert!(!normal.has_moving_support());
+    }
+}

@@ -1,0 +1,113 @@
+//! The vector-Jacobian product of posing by rotation vectors, from forces on points to torques about joints: as much work as
+//! there are joints. [`Rig::transforms_vjp`] is the plain way, for any pose.
+
+use super::{Armature, JointPose, Rules, Turn};
+use crate::geom::GeomError;
+use glam::{DMat3, DVec3};
+
+/// Derivatives of something by what a body is posed from.
+#[derive(Clone, Debug, PartialEq)]
+pub struct BodyGradient {
+    /// By each joint's rotation vector.
+    pub turns: Vec<DVec3>,
+    /// By each joint's head at rest.
+    pub heads: Vec<DVec3>,
+    /// By each keypoint's place at rest.
+    pub keypoints: Vec<DVec3>,
+}
+
+impl Armature {
+    /// From the derivatives by the posed keypoints. `None` for a pose with anything but rotation vectors, or scales that are
+    /// inherited.
+    ///
+    /// # Errors
+    /// A pose that is not finite.
+    pub fn pull_keypoints(
+        &self,
+        pose: &[JointPose],
+        rules: &Rules,
+        by_keypoint: &[DVec3],
+    ) -> Result<Option<BodyGradient>, GeomError> {
+        let rig = self.rig();
+        let plain = |p: &JointPose| p.location == DVec3::ZERO && p.scale == DVec3::ONE && vector(p).is_some();
+        if rules.inherit_scale || !pose.iter().all(plain) {
+            return Ok(None);
+        }
+        let transforms = rig.transforms(pose, rules)?;
+        let count = rig.joints().len();
+        // Of everything that hangs on a joint: the sum of the derivatives (forces), and of p x g (torques about the origin).
+        let (mut force, mut torque) = (vec![DVec3::ZERO; count], vec![DVec3::ZERO; count]);
+        let mut keypoints = Vec::with_capacity(by_keypoint.len());
+        for (k, g) in rig.keypoints().iter().zip(by_keypoint) {
+            let t = &transforms[k.joint];
+            force[k.joint] += *g;
+            torque[k.joint] += t.transform_point3(k.rest).cross(*g);
+            keypoints.push(t.matrix3.transpose() * *g);
+        }
+        let (mut turns, mut heads) = (vec![DVec3::ZERO; count], vec![DVec3::ZERO; count]);
+        for j in (0..count).rev() {
+            let joint = &rig.joints()[j];
+            let (f, t) = (force[j], torque[j]);
+            let up = joint.parent.map_or(DMat3::IDENTITY, |p| transforms[p].matrix3);
+            // The head is where its parent puts it, and its own turn leaves it there.
+            let pivot = transforms[j].transform_point3(joint.head);
+            let local = up.transpose() * (t - pivot.cross(f));
+            turns[j] = transposed_left_jacobian(pose.get(j).and_then(vector).unwrap_or(DVec3::ZERO), local);
+            // x -> R (x - h) + h.
+            heads[j] = (up.transpose() - transforms[j].matrix3.transpose()) * f;
+            if let Some(p) = joint.parent {
+                force[p] += f;
+                torque[p] += t;
+            }
+        }
+        Ok(Some(BodyGradient { turns, heads, keypoints }))
+    }
+
+    /// From the derivatives by the heads and keypoints at rest to those by the amounts of morphs.
+    ///
+    /// # Errors
+    /// A morph it does not have.
+    pub fn pull_morphs(&self, names: &[&str], heads: &[DVec3], keypoints: &[DVec3]) -> Result<Vec<f64>, GeomError> {
+        names.iter().map(|name| self.pull_morph(name, heads, keypoints)).collect()
+    }
+}
+
+fn vector(p: &JointPose) -> Option<DVec3> {
+    match p.turn {
+        Turn::Vector(v) => Some(v),
+        _ => None,
+    }
+}
+
+/// J' t with exp(w + dw) = exp(J dw) exp(w): J = I + a [w]x + b [w]x^2 with a = (1 - cos |w|) / |w|^2, b = (|w| - sin |w|) / |w|^3.
+fn transposed_left_jacobian(w: DVec3, t: DVec3) -> DVec3 {
+    let square = w.length_squared();
+    let angle = square.sqrt();
+    let (a, b) = if angle < 1e-3 {
+        // Series: what is left out is below the rounding of doubles.
+        (0.5 - square / 24.0 + square * square / 720.0, 1.0 / 6.0 - square / 120.0 + square * square / 5040.0)
+    } else {
+        ((1.0 - libm::cos(angle)) / square, (angle - libm::sin(angle)) / (square * angle))
+    };
+    let c = w.cross(t);
+    t - c * a + w.cross(c) * b
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    #[test]
+    fn the_left_jacobian_is_that_of_differences() {
+        for w in [DVec3::ZERO, DVec3::new(1e-5, 2e-4, -1e-4), DVec3::new(0.3, -1.2, 0.5), DVec3::new(2.0, 1.0, -2.5)] {
+            let (x, g) = (DVec3::new(0.3, -0.4, 1.1), DVec3::new(0.7, 0.2, -0.6));
+            let f = |w: DVec3| (glam::DQuat::from_scaled_axis(w) * x).dot(g);
+            let torque = (glam::DQuat::from_scaled_axis(w) * x).cross(g);
+            let found = transposed_left_jacobian(w, torque);
+            for (axis, found) in DVec3::AXES.into_iter().zip(found.to_array()) {
+                let slope = (f(w + axis * 1e-5) - f(w - axis * 1e-5)) / 2e-5;
+                assert!((found - slope).abs() < 1e-8, "{w}: {found} {slope}");
+            }
+        }
+    }
+}

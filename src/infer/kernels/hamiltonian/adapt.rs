@@ -1,0 +1,160 @@
+//! Warm-up of Hamiltonian kernels: dual averaging of the step size (Hoffman & Gelman 2014, section 3.2) and a diagonal metric
+//! from the variances of windows that double in length, as in Stan.
+
+use super::system::{self, Point, System};
+use crate::rng::Stream;
+use crate::trace::TraceResult;
+
+/// Dual averaging's constants, as in Stan.
+const GAMMA: f64 = 0.05;
+const T0: f64 = 10.0;
+const KAPPA: f64 = 0.75;
+
+/// The first states are left out of variances; then comes the first window.
+const BURN: u32 = 30;
+const WINDOW: u32 = 25;
+
+#[derive(Clone, Debug)]
+pub(super) struct Adaptation {
+    /// The mean acceptance aimed at.
+    target: f64,
+    /// What the metric belongs to: addresses and their numbers of coordinates.
+    signature: Vec<(u64, usize)>,
+    pub inverse_mass: Vec<f64>,
+    /// A step size that was given; else it is learnt.
+    fixed: Option<f64>,
+    step: f64,
+    averaged: f64,
+    mean_log: f64,
+    bias: f64,
+    rounds: f64,
+    seen: u32,
+    window_end: u32,
+    window: u32,
+    mean: Vec<f64>,
+    square: Vec<f64>,
+    count: f64,
+}
+
+impl Adaptation {
+    pub fn new(target: f64, fixed: Option<f64>) -> Self {
+        Adaptation {
+            target,
+            signature: Vec::new(),
+            inverse_mass: Vec::new(),
+            fixed,
+            step: 0.0,
+            averaged: 0.0,
+            mean_log: 0.0,
+            bias: 0.0,
+            rounds: 0.0,
+            seen: 0,
+            window_end: BURN + WINDOW,
+            window: WINDOW,
+            mean: Vec::new(),
+            square: Vec::new(),
+            count: 0.0,
+        }
+    }
+
+    /// The step size to use now, found by trial when there is none yet.
+    pub fn step(
+        &mut self,
+        system: &mut System,
+        here: &Point,
+        adapting: bool,
+        rng: &mut Stream,
+    ) -> TraceResult<f64> {
+        let signature = system.signature();
+        if signature != self.signature {
+            // Other choices than before: what was learnt belongs to those that are still there.
+            let mut old = std::collections::BTreeMap::new();
+            let mut from = 0;
+            for (hash, n) in &self.signature {
+                old.insert(*hash, self.inverse_mass[from..from + n].to_vec());
+                from += n;
+            }
+            let known = |(hash, n): &(u64, usize)| old.get(hash).filter(|m| m.len() == *n).cloned();
+            self.inverse_mass = signature.iter().flat_map(|s| known(s).unwrap_or_else(|| vec![1.0; s.1])).collect();
+            self.signature = signature;
+            self.forget();
+            if adapting {
+                self.restart(system, here, rng)?;
+            }
+        }
+        if let Some(step) = self.fixed {
+            return Ok(step);
+        }
+        if self.step == 0.0 {
+            self.restart(system, here, rng)?;
+        }
+        Ok(if adapting || self.averaged == 0.0 { self.step } else { self.averaged })
+    }
+
+    /// Learns from a transition: its mean acceptance and where it ended.
+    pub fn learn(&mut self, acceptance: f64, y: &[f64]) {
+        self.rounds += 1.0;
+        let weight = 1.0 / (self.rounds + T0);
+        let off = self.target - if acceptance.is_nan() { 0.0 } else { acceptance.min(1.0) };
+        self.bias = (1.0 - weight) * self.bias + weight * off;
+        let log_step = self.mean_log - self.bias * self.rounds.sqrt() / GAMMA;
+        let share = libm::pow(self.rounds, -KAPPA);
+        let log_averaged = share * log_step + (1.0 - share) * libm::log(self.averaged.max(f64::MIN_POSITIVE));
+        self.step = libm::exp(log_step.clamp(-30.0, 10.0));
+        self.averaged = if self.rounds == 1.0 { self.step } else { libm::exp(log_averaged.clamp(-30.0, 10.0)) };
+        self.seen += 1;
+        if self.seen > BURN {
+            self.count += 1.0;
+            for ((m, s), y) in self.mean.iter_mut().zip(&mut self.square).zip(y) {
+                let d = y - *m;
+                *m += d / self.count;
+                *s += d * (y - *m);
+            }
+        }
+        if self.seen == self.window_end {
+            // Towards a small variance, as Stan does, for few states.
+            let n = self.count;
+            for (m, s) in self.inverse_mass.iter_mut().zip(&self.square) {
+                *m = (n / (n + 5.0)) * (s / (n - 1.0)) + 1e-3 * 5.0 / (n + 5.0);
+            }
+            self.forget();
+            self.window *= 2;
+            self.window_end = self.seen + self.window;
+            // The step is learnt anew for the new metric, from about where it was.
+            self.mean_log = libm::log(10.0 * self.averaged);
+            (self.bias, self.rounds) = (0.0, 0.0);
+            self.step = self.averaged;
+        }
+    }
+
+    fn forget(&mut self) {
+        let n = self.inverse_mass.len();
+        (self.mean, self.square, self.count) = (vec![0.0; n], vec![0.0; n], 0.0);
+    }
+
+    /// Doubles or halves the step until one leapfrog step is accepted half of the time (algorithm 4).
+    fn restart(&mut self, system: &mut System, here: &Point, rng: &mut Stream) -> TraceResult<()> {
+        let mut step = if self.averaged > 0.0 { self.averaged } else { 0.5 / (system.dimensions() as f64).powf(0.25) };
+        let mut direction = 0.0;
+        for _ in 0..40 {
+            let p = system::draw(&self.inverse_mass, rng);
+            let start = system::kinetic(&p, &self.inverse_mass);
+            let ratio = match system.leapfrog(here, &p, step, &self.inverse_mass)? {
+                Some((to, q)) => to.log_density - here.log_density + start - system::kinetic(&q, &self.inverse_mass),
+                None => f64::NEG_INFINITY,
+            };
+            let up = if ratio > libm::log(0.8) { 1.0 } else { -1.0 };
+            if direction == 0.0 {
+                direction = up;
+            } else if up != direction {
+                break;
+            }
+            step *= libm::exp2(direction);
+        }
+        self.step = step;
+        self.averaged = step;
+        self.mean_log = libm::log(10.0 * step);
+        (self.bias, self.rounds) = (0.0, 0.0);
+        Ok(())
+    }
+}

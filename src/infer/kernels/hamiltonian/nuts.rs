@@ -1,0 +1,196 @@
+//! `nuts(sel, max_depth)`: the No-U-Turn sampler (Hoffman & Gelman 2014) with multinomial sampling over the trajectory and the
+//! generalised stopping rule, checked across subtrees too (Betancourt 2017; as Stan has it).
+
+use super::{Adaptation, DIVERGENT, Momentum, Point, System, system};
+use crate::infer::kernel::{At, Kernel, Outcome, Registered, Scope};
+use crate::num::log_sum_exp;
+use crate::rng::Stream;
+use crate::trace::{Trace, TraceResult};
+
+/// The No-U-Turn sampler.
+#[derive(Clone, Debug)]
+pub struct Nuts {
+    scope: Registered,
+    max_depth: u32,
+    adaptation: Adaptation,
+}
+
+impl Nuts {
+    /// The kernel for these choices; a trajectory doubles at most `max_depth` times.
+    pub fn new(scope: Scope, max_depth: u32) -> Self {
+        Nuts { scope: Registered::new(scope), max_depth, adaptation: Adaptation::new(0.8, None) }
+    }
+}
+
+/// An end of a trajectory.
+#[derive(Clone, Debug)]
+struct End {
+    point: Point,
+    momentum: Momentum,
+    /// The momentum times the inverse mass.
+    velocity: Vec<f64>,
+}
+
+/// A stretch of a trajectory, in the order in which it was made.
+struct Tree {
+    first: End,
+    last: End,
+    /// The sum of the momenta.
+    sum: Momentum,
+    proposal: Point,
+    log_weight: f64,
+    /// Whether it turns back on itself, or diverges.
+    stop: bool,
+}
+
+/// What a transition needs besides the tree.
+struct Walk<'s, 'a> {
+    system: &'s mut System<'a>,
+    mass: &'s [f64],
+    step: f64,
+    /// The energy at the start.
+    energy: f64,
+    acceptance: f64,
+    leaps: f64,
+    divergent: bool,
+    rng: &'s mut Stream,
+}
+
+impl Walk<'_, '_> {
+    fn end(&self, point: Point, momentum: Momentum) -> End {
+        let velocity = momentum.iter().zip(self.mass).map(|(p, m)| p * m).collect();
+        End { point, momentum, velocity }
+    }
+
+    /// A tree of 2^depth leaps from an end; `None` when the very first leaves the space.
+    fn grow(&mut self, depth: u32, from: &End) -> TraceResult<Option<Tree>> {
+        if depth == 0 {
+            return self.leap(from);
+        }
+        let Some(inner) = self.grow(depth - 1, from)? else { return Ok(None) };
+        if inner.stop {
+            return Ok(Some(inner));
+        }
+        let Some(outer) = self.grow(depth - 1, &inner.last)? else { return Ok(None) };
+        let log_weight = log_sum_exp(&[inner.log_weight, outer.log_weight]);
+        let take = self.rng.uniform() < libm::exp(outer.log_weight - log_weight);
+        let proposal = if take { outer.proposal.clone() } else { inner.proposal.clone() };
+        Ok(Some(join(inner, outer, proposal, log_weight)))
+    }
+
+    fn leap(&mut self, from: &End) -> TraceResult<Option<Tree>> {
+        self.leaps += 1.0;
+        let Some((point, momentum)) = self.system.leapfrog(&from.point, &from.momentum, self.step, self.mass)? else {
+            self.divergent = true;
+            return Ok(None);
+        };
+        let log_weight = self.energy - (system::kinetic(&momentum, self.mass) - point.log_density);
+        self.acceptance += libm::exp(log_weight.min(0.0));
+        // Not of NaN.
+        if !(log_weight > -DIVERGENT) {
+            self.divergent = true;
+            return Ok(None);
+        }
+        let end = self.end(point, momentum);
+        Ok(Some(Tree {
+            sum: end.momentum.clone(),
+            proposal: end.point.clone(),
+            log_weight,
+            stop: false,
+            first: end.clone(),
+            last: end,
+        }))
+    }
+}
+
+/// Two stretches, the second made after the first, in the same direction of time.
+fn join(inner: Tree, outer: Tree, proposal: Point, log_weight: f64) -> Tree {
+    let sum = plus(&inner.sum, &outer.sum);
+    let turns = turning(&inner.first, &outer.last, &sum)
+        || turning(&inner.first, &outer.first, &plus(&inner.sum, &outer.first.momentum))
+        || turning(&inner.last, &outer.last, &plus(&outer.sum, &inner.last.momentum));
+    Tree { stop: inner.stop || outer.stop || turns, first: inner.first, last: outer.last, sum, proposal, log_weight }
+}
+
+fn plus(a: &[f64], b: &[f64]) -> Vec<f64> {
+    a.iter().zip(b).map(|(a, b)| a + b).collect()
+}
+
+/// Whether one end no longer moves along the way.
+fn turning(a: &End, b: &End, sum: &[f64]) -> bool {
+    let along = |v: &[f64]| v.iter().zip(sum).map(|(v, s)| v * s).sum::<f64>();
+    // Also of NaN.
+    !(along(&a.velocity) > 0.0 && along(&b.velocity) > 0.0)
+}
+
+/// The same stretch run through the other way.
+fn reversed(mut t: Tree) -> Tree {
+    std::mem::swap(&mut t.first, &mut t.last);
+    t
+}
+
+impl Kernel for Nuts {
+    fn name(&self) -> String {
+        "nuts".into()
+    }
+
+    fn step(&mut self, trace: &mut Trace, at: &At) -> TraceResult<Outcome> {
+        let mut rng = at.stream();
+        let (targets, _) = self.scope.members(trace, &mut rng);
+        let Some((mut system, here)) = System::begin(trace, at, &targets)? else { return Ok(Outcome::default()) };
+        let step = self.adaptation.step(&mut system, &here, at.adapting, &mut rng)?;
+        let mass = self.adaptation.inverse_mass.clone();
+        let momentum = system::draw(&mass, &mut rng);
+        let energy = system::kinetic(&momentum, &mass) - here.log_density;
+        let mut walk = Walk {
+            system: &mut system,
+            mass: &mass,
+            step,
+            energy,
+            acceptance: 0.0,
+            leaps: 0.0,
+            divergent: false,
+            rng: &mut rng,
+        };
+        let end = walk.end(here.clone(), momentum);
+        // In the order of time: `first` is the past.
+        let mut tree = Tree {
+            sum: end.momentum.clone(),
+            proposal: here.clone(),
+            log_weight: 0.0,
+            stop: false,
+            first: end.clone(),
+            last: end,
+        };
+        let mut moved = false;
+        for depth in 0..self.max_depth {
+            let forward = walk.rng.uniform() < 0.5;
+            walk.step = if forward { step } else { -step };
+            let from = if forward { tree.last.clone() } else { tree.first.clone() };
+            let Some(new) = walk.grow(depth, &from)? else { break };
+            if new.stop {
+                break;
+            }
+            // Biased towards the new half, which keeps the target (Betancourt 2017, A.3.2).
+            let take = walk.rng.uniform() < libm::exp(new.log_weight - tree.log_weight);
+            let log_weight = log_sum_exp(&[tree.log_weight, new.log_weight]);
+            let proposal = if take { new.proposal.clone() } else { tree.proposal.clone() };
+            moved |= take;
+            tree = if forward {
+                join(tree, new, proposal, log_weight)
+            } else {
+                // Both as seen by someone going back in time, and turned round again.
+                reversed(join(reversed(tree), new, proposal, log_weight))
+            };
+            if tree.stop {
+                break;
+            }
+        }
+        let (acceptance, divergent) = (walk.acceptance / walk.leaps.max(1.0), walk.divergent);
+        let moved = system.settle(moved.then_some(&tree.proposal))?;
+        if at.adapting {
+            self.adaptation.learn(acceptance, if moved { &tree.proposal.y } else { &here.y });
+        }
+        Ok(Outcome { divergent: u32::from(divergent), ..Outcome::one(moved) })
+    }
+}

@@ -1,0 +1,234 @@
+//! Adjoints: the derivatives of a number by a value, in the value's shape. They are what flows backwards through a program
+//! when a gradient is taken (reverse mode).
+
+use super::value::Value;
+use std::sync::Arc;
+
+/// The derivatives of a number by a value.
+#[derive(Clone, Debug, Default, PartialEq)]
+pub enum Adjoint {
+    /// Zero, whatever the shape.
+    #[default]
+    Zero,
+    /// By a number.
+    Num(f64),
+    /// By an array of numbers. By a distribution: by its parameters, in the order of its constructor. By an object or a
+    /// likelihood: as its type says.
+    Array(Vec<f64>),
+    /// By the elements of an array.
+    List(Vec<Adjoint>),
+    /// By some fields of a record.
+    Record(Vec<(Arc<str>, Adjoint)>),
+    /// There is a dependence, and nobody knows its derivative.
+    Unknown,
+}
+
+impl Adjoint {
+    /// Whether nothing flows.
+    pub fn is_zero(&self) -> bool {
+        matches!(self, Adjoint::Zero)
+    }
+
+    /// Whether something in it is unknown.
+    pub fn is_unknown(&self) -> bool {
+        match self {
+            Adjoint::Unknown => true,
+            Adjoint::List(all) => all.iter().any(Adjoint::is_unknown),
+            Adjoint::Record(all) => all.iter().any(|(_, a)| a.is_unknown()),
+            _ => false,
+        }
+    }
+
+    /// By a number; 0 for what is none.
+    pub fn number(&self) -> f64 {
+        if let Adjoint::Num(g) = self { *g } else { 0.0 }
+    }
+
+    /// By element `i` of an array.
+    pub fn element(&self, i: usize) -> Adjoint {
+        match self {
+            Adjoint::Array(gs) => gs.get(i).map_or(Adjoint::Zero, |g| Adjoint::Num(*g)),
+            Adjoint::List(all) => all.get(i).cloned().unwrap_or_default(),
+            Adjoint::Unknown => Adjoint::Unknown,
+            _ => Adjoint::Zero,
+        }
+    }
+
+    /// By a field of a record.
+    pub fn field(&self, name: &str) -> Adjoint {
+        match self {
+            Adjoint::Record(all) => all.iter().find(|(n, _)| **n == *name).map(|(_, a)| a.clone()).unwrap_or_default(),
+            Adjoint::Unknown => Adjoint::Unknown,
+            _ => Adjoint::Zero,
+        }
+    }
+
+    /// By the numbers of an array, so many of them.
+    pub fn numbers(&self, n: usize) -> Vec<f64> {
+        match self {
+            Adjoint::Array(gs) if gs.len() == n => gs.clone(),
+            other => (0..n).map(|i| other.element(i).number()).collect(),
+        }
+    }
+
+    /// Adds another of the same shape.
+    pub fn add(&mut self, other: Adjoint) {
+        match (&mut *self, other) {
+            (_, Adjoint::Zero) | (Adjoint::Unknown, _) => {}
+            (Adjoint::Zero, other) => *self = other,
+            (Adjoint::Num(a), Adjoint::Num(b)) => *a += b,
+            (Adjoint::Array(a), Adjoint::Array(b)) => {
+                if a.len() < b.len() {
+                    a.resize(b.len(), 0.0);
+                }
+                a.iter_mut().zip(b).for_each(|(a, b)| *a += b);
+            }
+            (Adjoint::Record(_), Adjoint::Record(fields)) => {
+                fields.into_iter().for_each(|(name, by)| self.add_field(&name, by));
+            }
+            (Adjoint::Array(_) | Adjoint::List(_), other @ (Adjoint::Array(_) | Adjoint::List(_))) => {
+                let n = match &other {
+                    Adjoint::List(all) => all.len(),
+                    Adjoint::Array(gs) => gs.len(),
+                    _ => 0,
+                };
+                (0..n).for_each(|i| self.add_element(n, i, other.element(i)));
+            }
+            _ => *self = Adjoint::Unknown,
+        }
+    }
+
+    /// Adds to element `i` of an array of `n`.
+    pub fn add_element(&mut self, n: usize, i: usize, by: Adjoint) {
+        match (&mut *self, by) {
+            (_, Adjoint::Zero) | (Adjoint::Unknown, _) => {}
+            (Adjoint::Zero, Adjoint::Num(g)) => {
+                let mut all = vec![0.0; n];
+                if let Some(a) = all.get_mut(i) {
+                    *a = g;
+                }
+                *self = Adjoint::Array(all);
+            }
+            (Adjoint::Array(all), Adjoint::Num(g)) => {
+                if all.len() < n {
+                    all.resize(n, 0.0);
+                }
+                if let Some(a) = all.get_mut(i) {
+                    *a += g;
+                }
+            }
+            (Adjoint::List(all), by) => {
+                if all.len() < n {
+                    all.resize(n, Adjoint::Zero);
+                }
+                if let Some(a) = all.get_mut(i) {
+                    a.add(by);
+                }
+            }
+            (Adjoint::Zero, by) => {
+                let mut all = vec![Adjoint::Zero; n];
+                if let Some(a) = all.get_mut(i) {
+                    *a = by;
+                }
+                *self = Adjoint::List(all);
+            }
+            (Adjoint::Array(gs), by) => {
+                let all = gs.iter().map(|g| Adjoint::Num(*g)).collect();
+                *self = Adjoint::List(all);
+                self.add_element(n, i, by);
+            }
+            _ => *self = Adjoint::Unknown,
+        }
+    }
+
+    /// Adds to a field of a record.
+    pub fn add_field(&mut self, name: &Arc<str>, by: Adjoint) {
+        if by.is_zero() {
+            return;
+        }
+        match &mut *self {
+            Adjoint::Zero => *self = Adjoint::Record(vec![(Arc::clone(name), by)]),
+            Adjoint::Record(all) => match all.iter_mut().find(|(n, _)| n == name) {
+                Some((_, a)) => a.add(by),
+                None => all.push((Arc::clone(name), by)),
+            },
+            _ => *self = Adjoint::Unknown,
+        }
+    }
+
+    /// Adds to what indexing a value with these keys picks out, one key after the other.
+    pub fn add_at(&mut self, base: &Value, keys: &[Value], by: Adjoint) {
+        let Some((key, rest)) = keys.split_first() else { return self.add(by) };
+        if by.is_zero() {
+            return;
+        }
+        match (base, key) {
+            (Value::Array(_) | Value::List(_), Value::Num(i)) => {
+                let (n, i) = (base.len().unwrap_or(0), *i as usize);
+                let mut inner = Adjoint::Zero;
+                inner.add_at(&base.element(i).unwrap_or_default(), rest, by);
+                self.add_element(n, i, inner);
+            }
+            (Value::Array(_) | Value::List(_), Value::Array(at)) => {
+                let n = base.len().unwrap_or(0);
+                for (k, i) in at.iter().enumerate() {
+                    // What comes after picks from the array of what was picked.
+                    let part = if rest.is_empty() { by.element(k) } else { Adjoint::Unknown };
+                    self.add_element(n, *i as usize, part);
+                }
+            }
+            (Value::Record(r), Value::Str(name)) => {
+                let mut inner = Adjoint::Zero;
+                inner.add_at(r.get(name).unwrap_or(&Value::Unit), rest, by);
+                self.add_field(name, inner);
+            }
+            _ => *self = Adjoint::Unknown,
+        }
+    }
+
+    /// In the shape of a record's fields, by position.
+    pub fn add_position(&mut self, base: &Value, i: usize, by: Adjoint) {
+        match base {
+            Value::Record(r) => {
+                if let Some((name, _)) = r.get_index(i) {
+                    self.add_field(name, by);
+                }
+            }
+            _ => self.add_element(base.len().unwrap_or(0), i, by),
+        }
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    #[test]
+    fn arrays_become_lists_when_they_must() {
+        let mut a = Adjoint::Zero;
+        a.add_element(3, 1, Adjoint::Num(2.0));
+        assert_eq!(a, Adjoint::Array(vec![0.0, 2.0, 0.0]));
+        a.add(Adjoint::Array(vec![1.0, 1.0, 1.0]));
+        a.add_element(3, 0, Adjoint::Zero);
+        assert_eq!(a.numbers(3), [1.0, 3.0, 1.0]);
+        let mut rows = Adjoint::Zero;
+        rows.add_element(2, 1, Adjoint::Array(vec![5.0]));
+        assert_eq!((rows.element(0), rows.element(1)), (Adjoint::Zero, Adjoint::Array(vec![5.0])));
+    }
+
+    #[test]
+    fn indexing_goes_back_to_where_it_came_from() {
+        let base = Value::record([("x", Value::array(vec![1.0, 2.0])), ("y", Value::Num(3.0))]);
+        let mut a = Adjoint::Zero;
+        a.add_at(&base, &[Value::str("x"), Value::Num(1.0)], Adjoint::Num(4.0));
+        a.add_at(&base, &[Value::str("y")], Adjoint::Num(5.0));
+        assert_eq!(a.field("x").numbers(2), [0.0, 4.0]);
+        assert_eq!(a.field("y"), Adjoint::Num(5.0));
+        let mut picked = Adjoint::Zero;
+        let xs = Value::array(vec![1.0, 2.0, 3.0]);
+        picked.add_at(&xs, &[Value::array(vec![2.0, 2.0, 0.0])], Adjoint::Array(vec![1.0, 10.0, 100.0]));
+        assert_eq!(picked.numbers(3), [100.0, 0.0, 11.0]);
+        picked.add(Adjoint::Unknown);
+        assert!(picked.is_unknown());
+    }
+}

@@ -1,0 +1,238 @@
+//! Gradients of the log joint density by chosen choices: reverse mode over the trace.
+//!
+//! The nodes between the choices and what they are scored by are put in an order in which operands come first; derivatives
+//! then flow from the scores back through that order. Structure is taken as it is: which branch is taken, how many choices
+//! there are, what a discrete choice is. Built-ins bring their own vector-Jacobian products ([`crate::lang::builtins`]),
+//! distributions and likelihoods their gradients, supports those of their transforms.
+
+mod pull;
+mod scores;
+
+use super::choices::Target;
+use super::demand::Failure;
+use super::graph::Graph;
+use super::node::*;
+use crate::lang::adjoint::Adjoint;
+use crate::lang::code::{Code, DistSpec, Operand};
+use crate::lang::error::FaultKind;
+use crate::lang::value::Value;
+use rustc_hash::FxHashMap;
+use smallvec::SmallVec;
+
+/// Nodes that a value is computed from.
+type Inputs = SmallVec<[NodeId; 8]>;
+
+/// Whether a node's value depends on a choice that the gradient is by.
+#[derive(Clone, Copy, PartialEq, Eq)]
+enum Mark {
+    Unseen,
+    Target,
+    Open,
+    Fixed,
+    Active,
+}
+
+/// A reverse pass.
+pub(super) struct Reverse<'a> {
+    graph: &'a Graph,
+    code: &'a Code,
+    marks: Vec<Mark>,
+    /// The active nodes, operands first.
+    order: Vec<NodeId>,
+    adjoints: FxHashMap<NodeId, Adjoint>,
+    /// The power of the likelihood.
+    power: f64,
+}
+
+impl Graph {
+    /// The gradient, by the unconstrained coordinates of the targets one after the other, of the log prior plus `power` times
+    /// the log likelihood plus the log Jacobians of the transforms. Discrete targets have no coordinates.
+    ///
+    /// # Errors
+    /// A dependence on a target that has no derivative, with the operation that has none.
+    pub fn gradient(
+        &self,
+        code: &Code,
+        targets: &[Target],
+        scored: &[NodeId],
+        power: f64,
+        out: &mut Vec<f64>,
+    ) -> Result<(), Failure> {
+        let mut marks = vec![Mark::Unseen; self.nodes.len()];
+        for t in targets {
+            marks[t.node as usize] = Mark::Target;
+        }
+        let mut pass =
+            Reverse { graph: self, code, marks, order: Vec::new(), adjoints: FxHashMap::default(), power };
+        for t in targets {
+            pass.visit(t.node);
+        }
+        let mut active_scores = Vec::new();
+        for n in scored {
+            let mut reached = pass.marks[*n as usize] == Mark::Active;
+            for input in pass.score_inputs(*n) {
+                reached |= pass.visit(input);
+            }
+            if reached {
+                active_scores.push(*n);
+            }
+        }
+        for n in active_scores {
+            pass.pull_score(n)?;
+        }
+        let mut by_target: FxHashMap<NodeId, Adjoint> = FxHashMap::default();
+        while let Some(n) = pass.order.pop() {
+            let by = pass.adjoints.remove(&n).unwrap_or_default();
+            if by.is_unknown() {
+                return Err(pass.no_derivative(n, "what is made of this"));
+            }
+            if targets.iter().any(|t| t.node == n) {
+                pass.pull_support(n, targets, &by)?;
+                by_target.insert(n, by);
+            } else if !by.is_zero() {
+                pass.pull(n, &by)?;
+            }
+        }
+        for t in targets {
+            let by = by_target.get(&t.node).cloned().unwrap_or_default();
+            self.free_gradient(code, *t, &by, out);
+        }
+        Ok(())
+    }
+
+    /// From the derivative by a choice's stored form to that by its unconstrained coordinates.
+    fn free_gradient(&self, code: &Code, t: Target, by: &Adjoint, out: &mut Vec<f64>) {
+        let Some(dist) = self.dist_of(code, t.node) else { return };
+        let one = |dist: &crate::dist::Dist, stored: &crate::dist::Datum, by: &Adjoint, out: &mut Vec<f64>| {
+            let support = dist.stored_support();
+            let mut y = Vec::with_capacity(support.free_dim());
+            support.to_free(stored, &mut y);
+            let mut by_x = Vec::new();
+            flatten(by, support.gradient_dim(), &mut by_x);
+            support.free_gradient(&y, &by_x, out);
+        };
+        let Some(stored) = self.stored(t.node) else { return };
+        if dist.is_stored_whitened() {
+            // The value moves with the noise, which has a density of its own.
+            let size = stored.len().unwrap_or(0);
+            let (Some(mut g), Some(own)) = (dist.realise_pull(&by.numbers(size)), dist.gradient_stored(&stored)) else {
+                return out.resize(out.len() + size, 0.0);
+            };
+            g.iter_mut().zip(own.x).for_each(|(g, own)| *g += own);
+            return one(&dist, &stored, &Adjoint::Array(g), out);
+        }
+        match dist.elements() {
+            None => one(&dist, &stored, by, out),
+            Some(_) if t.element != NONE => {
+                let i = t.element as usize;
+                if let Some(x) = stored.element(i) {
+                    one(&dist.element(i), &x, &by.element(i), out);
+                }
+            }
+            Some(n) => {
+                for i in 0..n {
+                    if let Some(x) = stored.element(i) {
+                        one(&dist.element(i), &x, &by.element(i), out);
+                    }
+                }
+            }
+        }
+    }
+}
+
+/// The numbers of an adjoint one after the other.
+fn flatten(by: &Adjoint, n: usize, out: &mut Vec<f64>) {
+    match by {
+        Adjoint::Num(g) => out.push(*g),
+        Adjoint::Array(gs) => out.extend(gs),
+        Adjoint::List(all) => {
+            let each = n / all.len().max(1);
+            all.iter().for_each(|a| flatten(a, each, out));
+        }
+        _ => out.resize(out.len() + n, 0.0),
+    }
+}
+
+impl Reverse<'_> {
+    /// Whether a node's value depends on a target; if so it is put in order.
+    fn visit(&mut self, root: NodeId) -> bool {
+        // A node, its inputs, how many of them are done, whether it is active by now.
+        let mut stack: Vec<(NodeId, Inputs, usize, bool)> = Vec::new();
+        self.open(root, &mut stack);
+        while let Some((n, inputs, next, active)) = stack.last_mut() {
+            let Some(input) = inputs.get(*next).copied() else {
+                let (n, active) = (*n, *active);
+                stack.pop();
+                self.marks[n as usize] = if active { Mark::Active } else { Mark::Fixed };
+                if active {
+                    self.order.push(n);
+                }
+                continue;
+            };
+            match self.marks[input as usize] {
+                Mark::Unseen | Mark::Target => self.open(input, &mut stack),
+                mark => {
+                    *active |= mark == Mark::Active;
+                    *next += 1;
+                }
+            }
+        }
+        self.marks[root as usize] == Mark::Active
+    }
+
+    fn open(&mut self, n: NodeId, stack: &mut Vec<(NodeId, Inputs, usize, bool)>) {
+        let target = match self.marks[n as usize] {
+            Mark::Unseen => false,
+            Mark::Target => true,
+            _ => return,
+        };
+        let inputs = self.inputs(n, target);
+        if inputs.is_empty() && !target {
+            self.marks[n as usize] = Mark::Fixed;
+        } else {
+            self.marks[n as usize] = Mark::Open;
+            stack.push((n, inputs, 0, target));
+        }
+    }
+
+    /// The node that holds an operand's value; containers are read as a whole.
+    fn source(&self, frame: FrameId, o: Operand) -> Option<NodeId> {
+        let n = self.graph.resolve(frame, o)?;
+        Some(match &self.graph.nodes[n as usize].value {
+            Value::Container(r) => r.node + 1,
+            _ => n,
+        })
+    }
+
+    fn is_active(&self, n: NodeId) -> bool {
+        self.marks[n as usize] == Mark::Active
+    }
+
+    /// Adds to the adjoint of an operand.
+    fn give(&mut self, frame: FrameId, o: Operand, by: Adjoint) {
+        if let Some(n) = self.source(frame, o) {
+            self.give_node(n, by);
+        }
+    }
+
+    fn give_node(&mut self, n: NodeId, by: Adjoint) {
+        if !by.is_zero() && self.is_active(n) {
+            self.adjoints.entry(n).or_default().add(by);
+        }
+    }
+
+    fn dist_inputs(&self, n: NodeId, dist: &DistSpec, inputs: &mut Inputs) {
+        let frame = self.graph.nodes[n as usize].frame;
+        inputs.extend(dist.operands().iter().filter_map(|o| self.source(frame, *o)));
+    }
+
+    fn no_derivative(&self, n: NodeId, of: &str) -> Failure {
+        self.graph.fail(
+            self.code,
+            n,
+            FaultKind::Type,
+            format!("{of} depends on a selected choice, and its derivative is not known"),
+            Some("leave that choice to a kernel without gradients, such as drift".into()),
+        )
+    }
+}
