@@ -261,6 +261,9 @@ fn choices_that_appear_and_vanish() {
         with_mh!("gibbs(@c)"),
         with_mh!("gibbs(one($finite))"),
         with_mh!("drift($continuous, 0.8)"),
+        with_mh!("hmc($continuous, steps = 3)"),
+        with_mh!("mala($continuous)"),
+        with_mh!("nuts($continuous)"),
         with_mh!("block(@x/**)"),
     ];
     all_balanced(&STRUCTURE, 20_000, &kernels);
@@ -338,6 +341,9 @@ fn bounds_that_depend_on_another_choice() {
         "drift(@**, 0.8)",
         with_mh!("drift(@p1, 1)"),
         with_mh!("mh(@p2)"),
+        "hmc(@**, steps = 3)",
+        "mala(@**)",
+        "nuts(@**)",
     ];
     all_balanced(&SUPPORT, 20_000, &kernels);
 }

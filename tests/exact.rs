@@ -33,6 +33,13 @@ fn conjugate_normal_by_drift() {
 }
 
 #[test]
+fn conjugate_normal_by_hamiltonian_kernels() {
+    for kernel in ["hmc(@x, steps = 4)", "mala(@x)", "nuts(@x)"] {
+        conjugate_normal(kernel);
+    }
+}
+
+#[test]
 fn conjugate_normal_by_elliptical() {
     conjugate_normal("elliptical(@x)");
 }

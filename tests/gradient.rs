@@ -68,11 +68,38 @@ fn compare(trace: &mut Trace, text: &str) {
 #[test]
 fn functions_of_numbers() {
     for f in [
-        "exp(x)", "expm1(x)", "log(2 + x * x)", "log1p(x * x)", "sqrt(1 + x * x)", "pow(2 + abs(x), y)", "(3 + abs(x)) ** y",
-        "abs(x) * y", "sign(x) + y", "floor(x) + y", "x % 3.7", "sin(x) * y", "cos(x)", "tan(x / 4)", "asin(tanh(x))",
-        "acos(tanh(x) / 2)", "atan(x)", "atan2(y, x)", "sinh(x)", "cosh(x)", "tanh(x)", "deg(x)", "logit(expit(x) / 2 + 0.2)",
-        "expit(x)", "erf(x)", "lgamma(2 + abs(x))", "min(x, y)", "max(x, y, 0.3)", "clamp(x, -0.5, y + 2)", "-x / (4 + y * y)",
-        "x - y", "step(x) * y + x",
+        "exp(x)",
+        "expm1(x)",
+        "log(2 + x * x)",
+        "log1p(x * x)",
+        "sqrt(1 + x * x)",
+        "pow(2 + abs(x), y)",
+        "(3 + abs(x)) ** y",
+        "abs(x) * y",
+        "sign(x) + y",
+        "floor(x) + y",
+        "x % 3.7",
+        "sin(x) * y",
+        "cos(x)",
+        "tan(x / 4)",
+        "asin(tanh(x))",
+        "acos(tanh(x) / 2)",
+        "atan(x)",
+        "atan2(y, x)",
+        "sinh(x)",
+        "cosh(x)",
+        "tanh(x)",
+        "deg(x)",
+        "logit(expit(x) / 2 + 0.2)",
+        "expit(x)",
+        "erf(x)",
+        "lgamma(2 + abs(x))",
+        "min(x, y)",
+        "max(x, y, 0.3)",
+        "clamp(x, -0.5, y + 2)",
+        "-x / (4 + y * y)",
+        "x - y",
+        "step(x) * y + x",
     ] {
         check(&format!("assume x ~ normal(0.3, 1); assume y ~ normal(-0.2, 1); factor(-(({f}) - 0.5) ** 2);"));
     }
@@ -81,17 +108,43 @@ fn functions_of_numbers() {
 #[test]
 fn functions_of_arrays() {
     for f in [
-        "sum(z)", "prod(z)", "mean(z * z)", "var(z)", "sd(z)", "norm(z)", "log_sum_exp(z)", "sum(cumsum(z) ** 2)",
-        "dot(z, [1, 2, 3, 4])", "dot(z, z)", "sum(linspace(z[0], z[1], 5) ** 2)", "sum(range(z[0], z[0] + 2.05, 0.5) ** 2)",
-        "sum(fill(z[0], 3) ** 2)", "sum(concat(z, [x], z) ** 3)", "sum(append(z, x) ** 2 * [1, 2, 3, 4, 5])",
-        "dot(reverse(z), [1, 2, 3, 4])", "dot(sort(z), [1, 2, 3, 4])", "sum(sum_pairs(zip(z, reverse(z))))",
-        "sum(values({ a: x, b: x * 2 }) ** 2)", "sum(select(z > 0, z ** 2, x))", "interp(x, [-9, 0, 9], [1, 4, 2])",
-        "sum(interp([0.2, 0.7], [0, 0.5, 1], [x, z[0], z[1]]) ** 2)", "min(z)", "max(z)", "z[argmax(z)]", "len(z) * x",
-        "sum(z[[0, 0, 3]] ** 2)", "sum(matmul([[1, 2], [3, 4]], [z[0], x]) ** 2)",
-        "sum(matmul([[z[0], x], [3, z[1]]], [z[2], x]) ** 2)", "matmul([z[0], x], [z[1], 2])",
-        "sum(rows(matmul([[z[0], x], [1, 2]], [[2, z[1]], [x, 1]])))", "sum(matmul([x, z[1]], [[1, z[0]], [2, 1]]) ** 2)",
-        "sum(transpose([[z[0], 2], [x, 3]])[0] ** 2)", "sum(diag([x, z[0]])[1])", "sum(diag([[x, 1], [2, z[0]]]) ** 2)",
-        "sum(outer(z, [1, x])[2] ** 2)", "sum(-z / 3 + z * x)",
+        "sum(z)",
+        "prod(z)",
+        "mean(z * z)",
+        "var(z)",
+        "sd(z)",
+        "norm(z)",
+        "log_sum_exp(z)",
+        "sum(cumsum(z) ** 2)",
+        "dot(z, [1, 2, 3, 4])",
+        "dot(z, z)",
+        "sum(linspace(z[0], z[1], 5) ** 2)",
+        "sum(range(z[0], z[0] + 2.05, 0.5) ** 2)",
+        "sum(fill(z[0], 3) ** 2)",
+        "sum(concat(z, [x], z) ** 3)",
+        "sum(append(z, x) ** 2 * [1, 2, 3, 4, 5])",
+        "dot(reverse(z), [1, 2, 3, 4])",
+        "dot(sort(z), [1, 2, 3, 4])",
+        "sum(sum_pairs(zip(z, reverse(z))))",
+        "sum(values({ a: x, b: x * 2 }) ** 2)",
+        "sum(select(z > 0, z ** 2, x))",
+        "interp(x, [-9, 0, 9], [1, 4, 2])",
+        "sum(interp([0.2, 0.7], [0, 0.5, 1], [x, z[0], z[1]]) ** 2)",
+        "min(z)",
+        "max(z)",
+        "z[argmax(z)]",
+        "len(z) * x",
+        "sum(z[[0, 0, 3]] ** 2)",
+        "sum(matmul([[1, 2], [3, 4]], [z[0], x]) ** 2)",
+        "sum(matmul([[z[0], x], [3, z[1]]], [z[2], x]) ** 2)",
+        "matmul([z[0], x], [z[1], 2])",
+        "sum(rows(matmul([[z[0], x], [1, 2]], [[2, z[1]], [x, 1]])))",
+        "sum(matmul([x, z[1]], [[1, z[0]], [2, 1]]) ** 2)",
+        "sum(transpose([[z[0], 2], [x, 3]])[0] ** 2)",
+        "sum(diag([x, z[0]])[1])",
+        "sum(diag([[x, 1], [2, z[0]]]) ** 2)",
+        "sum(outer(z, [1, x])[2] ** 2)",
+        "sum(-z / 3 + z * x)",
     ] {
         check(&format!(
             "fn rows(m) {{ [sum(m[0]), 2 * sum(m[1])] }}
@@ -104,20 +157,46 @@ fn functions_of_arrays() {
 #[test]
 fn distributions_by_value_and_parameters() {
     for d in [
-        "normal(a, s)", "lognormal(a, s)", "student_t(3 + s, a, s)", "cauchy(a, s)", "laplace(a, s)", "von_mises(a, s)",
-        "gamma(s, s + 1)", "inv_gamma(s, s)", "beta(s, s + 1)", "exponential(s)", "half_normal(s)", "half_cauchy(a, s)",
-        "weibull(s, s + 1)", "uniform(a, a + s)", "truncated_normal(a, s, -1, 2)", "truncated_normal(a, s, a - s, a + 2 * s)",
-        "truncated_normal(a, s, lo = a)", "mixture([0.3, s], [normal(a, 1), normal(0, s)])",
+        "normal(a, s)",
+        "lognormal(a, s)",
+        "student_t(3 + s, a, s)",
+        "cauchy(a, s)",
+        "laplace(a, s)",
+        "von_mises(a, s)",
+        "gamma(s, s + 1)",
+        "inv_gamma(s, s)",
+        "beta(s, s + 1)",
+        "exponential(s)",
+        "half_normal(s)",
+        "half_cauchy(a, s)",
+        "weibull(s, s + 1)",
+        "uniform(a, a + s)",
+        "truncated_normal(a, s, -1, 2)",
+        "truncated_normal(a, s, a - s, a + 2 * s)",
+        "truncated_normal(a, s, lo = a)",
+        "mixture([0.3, s], [normal(a, 1), normal(0, s)])",
     ] {
-        check(&format!("assume a ~ normal(0.3, 1); assume s ~ gamma(3, 2); assume v ~ {d}; observe normal(v, 0.7) = 0.4;"));
+        check(&format!(
+            "assume a ~ normal(0.3, 1); assume s ~ gamma(3, 2); assume v ~ {d}; observe normal(v, 0.7) = 0.4;"
+        ));
     }
     for (d, seen) in [
-        ("normal(a, s)", "0.7"), ("normal(a, s)", "[0.7, 1.1, -0.4]"), ("normal([a, 2 * a, s], s)", "[0.7, 1.1, -0.4]"),
-        ("iid(normal(a, s), 3)", "[0.7, 1.1, -0.4]"), ("student_t(4, a, s)", "[1, 2]"), ("poisson(s)", "3"),
-        ("binomial(7, expit(a))", "3"), ("flip(expit(a))", "true"), ("neg_binomial(s, expit(a))", "2"),
-        ("geometric(expit(a))", "4"), ("categorical([s, 1, s * s])", "2"), ("multinomial(4, [s, 1, 2])", "[1, 2, 1]"),
-        ("mv_normal([a, s], cov = [[2, 0.3], [0.3, 1]])", "[0.2, 0.4]"), ("dirichlet([s, 1, 2])", "[0.2, 0.3, 0.5]"),
-        ("mixture([s, 1], [normal(a, s), normal(2, 1)])", "[0.3, 0.9]"), ("normal(0, s)", "a * 2 + 1"),
+        ("normal(a, s)", "0.7"),
+        ("normal(a, s)", "[0.7, 1.1, -0.4]"),
+        ("normal([a, 2 * a, s], s)", "[0.7, 1.1, -0.4]"),
+        ("iid(normal(a, s), 3)", "[0.7, 1.1, -0.4]"),
+        ("student_t(4, a, s)", "[1, 2]"),
+        ("poisson(s)", "3"),
+        ("binomial(7, expit(a))", "3"),
+        ("flip(expit(a))", "true"),
+        ("neg_binomial(s, expit(a))", "2"),
+        ("geometric(expit(a))", "4"),
+        ("categorical([s, 1, s * s])", "2"),
+        ("multinomial(4, [s, 1, 2])", "[1, 2, 1]"),
+        ("mv_normal([a, s], cov = [[2, 0.3], [0.3, 1]])", "[0.2, 0.4]"),
+        ("dirichlet([s, 1, 2])", "[0.2, 0.3, 0.5]"),
+        ("mixture([s, 1], [normal(a, s), normal(2, 1)])", "[0.3, 0.9]"),
+        ("normal(0, s)", "a * 2 + 1"),
     ] {
         check(&format!("assume a ~ normal(0.3, 1); assume s ~ gamma(3, 2); observe {d} = {seen};"));
     }
@@ -180,7 +259,8 @@ fn bodies_with_detected_joints() {
         let place = scene.affine(translate = [x, 0.1, 0], rotate = turn, scale = s) * scene.affine(translate = [0, -0.9, 0]);
         let view = scene.render(place * scene.skin(person, pose));
         observe scene.keypoints(view, sd = 4, outlier = 0.1) = points as joints;"#;
-    let model = Program::parse(text).unwrap().observe_file("points", file.to_str().unwrap()).unwrap().compile().unwrap();
+    let model =
+        Program::parse(text).unwrap().observe_file("points", file.to_str().unwrap()).unwrap().compile().unwrap();
     for seed in 0..3 {
         let mut trace = model.simulate(seed, 0).unwrap();
         compare(&mut trace, "a body");
@@ -189,7 +269,8 @@ fn bodies_with_detected_joints() {
 
 #[test]
 fn what_has_no_derivative_says_so() {
-    let text = "assume l ~ gamma(2, 2); assume f ~ gp(mean = 0, cov = sq_exp(l), at = [0, 1]); observe normal(f, 1) = [0, 1];";
+    let text =
+        "assume l ~ gamma(2, 2); assume f ~ gp(mean = 0, cov = sq_exp(l), at = [0, 1]); observe normal(f, 1) = [0, 1];";
     let model = Program::parse(text).unwrap().compile().unwrap();
     let mut trace = model.simulate(1, 0).unwrap();
     let selection = trace.select(&Selector::All);

@@ -30,9 +30,15 @@ impl Joints {
         Joints { size, chains: (0..chains).map(|_| Mutex::default()).collect() }
     }
 
-    fn positions(&self, view: &ViewValue) -> Vec<(Arc<str>, Option<[f64; 2]>)> {
+    /// The width and height of the picture that positions are in.
+    fn pixels(&self, view: &ViewValue) -> (f64, f64) {
         let (width, height) = self.size.unwrap_or((view.0.camera().width, view.0.camera().height));
-        view.landmarks(width, height).map(|(name, at)| (Arc::clone(name), at)).collect()
+        (f64::from(width), f64::from(height))
+    }
+
+    fn positions(&self, view: &ViewValue) -> Vec<(Arc<str>, Option<[f64; 2]>)> {
+        let (width, height) = self.pixels(view);
+        view.landmarks(width as u32, height as u32).map(|(name, at)| (Arc::clone(name), at)).collect()
     }
 
     /// The file: means and spreads over all draws of all chains, and the best draw, that of `view`. None if it has no
@@ -67,9 +73,16 @@ impl Watch for Joints {
         let Some(at) = *chain.view.get_or_insert_with(|| view_operand(trace, draws)) else { return };
         let Ok(values) = trace.query(&[at], draws) else { return };
         let Some(view) = values.first().and_then(|v| v.downcast::<ViewValue>()) else { return };
+        let found = trace.located();
+        let (width, height) = self.pixels(view);
         for (name, at) in self.positions(view) {
-            if let Some(at) = at {
-                chain.moments.add(&name, at);
+            match (found.iter().find(|l| l.name == name), at) {
+                (Some(l), _) => {
+                    let diagonal = width * width + height * height;
+                    chain.moments.add(&name, [l.at[0] * width, l.at[1] * height], l.variance * diagonal);
+                }
+                (None, Some(at)) => chain.moments.add(&name, at, 0.0),
+                (None, None) => {}
             }
         }
     }

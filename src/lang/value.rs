@@ -90,6 +90,17 @@ pub trait Object: Any + fmt::Debug + Send + Sync {
     }
 }
 
+/// Where a named point of the scene is in the observed picture.
+#[derive(Clone, Debug, PartialEq)]
+pub struct Located {
+    /// Its name.
+    pub name: Arc<str>,
+    /// The mean, as shares of the picture's width and height, from its upper left corner.
+    pub at: [f64; 2],
+    /// The variance along an axis, in units of the squared diagonal.
+    pub variance: f64,
+}
+
 /// A log-density of an observed value given the scene: it scores, it has no sampler.
 ///
 /// What can be prepared from the observed value alone (a distance transform) is prepared once, by the implementation,
@@ -106,6 +117,10 @@ pub trait Likelihood: fmt::Debug + Send + Sync {
     /// that makes it understands; `None` where they are not known.
     fn gradient(&self, _observed: &Value) -> Option<Adjoint> {
         None
+    }
+    /// Named points of the scene as the observation puts them, where that says more than the scene alone.
+    fn located(&self, _observed: &Value) -> Vec<Located> {
+        Vec::new()
     }
     /// False when the result is not a density over observations, so that its scale is a matter of choice; the run then
     /// says that its posterior is a pseudo-posterior.

@@ -44,10 +44,11 @@ impl Point {
 pub struct Moments(IndexMap<Arc<str>, Point>);
 
 impl Moments {
-    /// Takes a point of a draw (Welford 1962); one that is not finite is left out.
-    pub fn add(&mut self, name: &Arc<str>, at: [f64; 2]) {
-        if at.iter().all(|x| x.is_finite()) {
-            let one = Point { count: 1, mean: at, squares: [0.0; 2] };
+    /// Takes a point of a draw (Welford 1962), or the mean and variance of what the draw says of it; one that is not finite is
+    /// left out.
+    pub fn add(&mut self, name: &Arc<str>, at: [f64; 2], variance: f64) {
+        if at.iter().all(|x| x.is_finite()) && variance.is_finite() {
+            let one = Point { count: 1, mean: at, squares: [variance; 2] };
             self.0.entry(Arc::clone(name)).or_default().merge(&one);
         }
     }
@@ -75,12 +76,12 @@ mod tests {
         let draws: Vec<[f64; 2]> = (0..50).map(|i| [1e6 + f64::from(i * i % 17), f64::from(i % 5) - 2.0]).collect();
         let of = |draws: &[[f64; 2]]| {
             let mut m = Moments::default();
-            draws.iter().for_each(|d| m.add(&name, *d));
+            draws.iter().for_each(|d| m.add(&name, *d, 0.0));
             m
         };
         let mut merged = of(&draws[..13]);
         merged.merge(&of(&draws[13..]));
-        merged.add(&name, [f64::NAN, 0.0]);
+        merged.add(&name, [f64::NAN, 0.0], 0.0);
         merged.merge(&Moments::default());
         let n = draws.len() as f64;
         let mean = [0, 1].map(|i| draws.iter().map(|d| d[i]).sum::<f64>() / n);

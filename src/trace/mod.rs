@@ -27,7 +27,7 @@ pub use select::{ChoiceKind, Pattern, PatternSegment, Selector};
 use crate::dist::{Datum, Dist};
 use crate::lang::code::{Code, DistSpec, Op, Operand};
 use crate::lang::error::RunError;
-use crate::lang::value::Value;
+use crate::lang::value::{Located, Value};
 use graph::Graph;
 use journal::Before;
 use node::{NONE, State};
@@ -229,8 +229,11 @@ impl Trace {
     pub fn gradient(&self, targets: &[Target], power: f64, out: &mut Vec<f64>) -> TraceResult<()> {
         let mut scored: Vec<u32> = self.graph.choices.selections[0].targets().iter().map(|t| t.node).collect();
         scored.dedup();
-        let effects = self.graph.nodes.iter().enumerate().filter(|(_, n)| n.state == State::Clean).map(|(i, _)| i as u32);
-        scored.extend(effects.filter(|n| matches!(self.graph.op(&self.code, *n), Op::Observe { .. } | Op::Factor { .. })));
+        let effects =
+            self.graph.nodes.iter().enumerate().filter(|(_, n)| n.state == State::Clean).map(|(i, _)| i as u32);
+        scored.extend(
+            effects.filter(|n| matches!(self.graph.op(&self.code, *n), Op::Observe { .. } | Op::Factor { .. })),
+        );
         self.graph.gradient(&self.code, targets, &scored, power, out)
     }
 
@@ -347,6 +350,19 @@ impl Trace {
         let result = self.graph.surrogate_score(&self.code, n);
         self.graph.rollback(&self.code, before);
         result
+    }
+
+    /// Named points of the scene as the observations put them (see [`crate::lang::value::Likelihood::located`]).
+    pub fn located(&self) -> Vec<Located> {
+        let mut all = Vec::new();
+        for (n, _) in self.scored() {
+            let Op::Observe { dist: DistSpec::Value(o), value, .. } = self.graph.op(&self.code, n) else { continue };
+            let frame = self.graph.nodes[n as usize].frame;
+            if let Value::Likelihood(l) = self.graph.value(&self.code, frame, *o) {
+                all.extend(l.located(self.graph.plain(&self.code, frame, *value, &mut node::Deps::new())));
+            }
+        }
+        all
     }
 
     /// Every observation and factor with its log density, in the order of the program's blocks.

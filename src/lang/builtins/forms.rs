@@ -5,7 +5,17 @@ use super::{Arg, Builtin, Derivative, Form, Kind, Type, arg};
 const SECTION: &str = "Forms";
 
 const fn form(name: &'static str, args: &'static [Arg], returns: Type, doc: &'static str, form: Form) -> Builtin {
-    Builtin { name, module: "", section: SECTION, args, variadic: false, returns, doc, kind: Kind::Form(form), derivative: Derivative::Unknown }
+    Builtin {
+        name,
+        module: "",
+        section: SECTION,
+        args,
+        variadic: false,
+        returns,
+        doc,
+        kind: Kind::Form(form),
+        derivative: Derivative::Unknown,
+    }
 }
 
 pub(super) const TABLE: &[Builtin] = &[

@@ -32,7 +32,17 @@ const fn name(
     returns: Type,
     doc: &'static str,
 ) -> Builtin {
-    Builtin { name, module: "", section, args, variadic: false, returns, doc, kind: Kind::Inference, derivative: Derivative::Unknown }
+    Builtin {
+        name,
+        module: "",
+        section,
+        args,
+        variadic: false,
+        returns,
+        doc,
+        kind: Kind::Inference,
+        derivative: Derivative::Unknown,
+    }
 }
 
 const SEL: Arg = arg("sel", Type::Selection, "The choices it moves.");

@@ -1,8 +1,8 @@
 //! Functions of numbers, element by element on arrays, through libm so that they are the same on every platform.
 
+use super::derivative::{self, of_two, one_of};
 use super::elementwise::{binary, numeric, unary};
 use super::reduce::{largest, smallest};
-use super::derivative::{self, of_two, one_of};
 use super::{Arg, Args, Builtin, Pull, Pulled, Type, arg, function};
 use crate::lang::adjoint::Adjoint;
 use crate::lang::error::Fault;
@@ -22,21 +22,36 @@ const fn steps(name: &'static str, doc: &'static str, f: fn(&Args) -> Result<Val
     function(name, SECTION, X, Type::Nums, doc, f).flat()
 }
 
-const fn of_angle(
-    name: &'static str,
-    doc: &'static str,
-    f: fn(&Args) -> Result<Value, Fault>,
-    pull: Pull,
-) -> Builtin {
+const fn of_angle(name: &'static str, doc: &'static str, f: fn(&Args) -> Result<Value, Fault>, pull: Pull) -> Builtin {
     function(name, SECTION, ANGLE, Type::Nums, doc, f).pull(pull)
 }
 
 pub(super) const TABLE: &[Builtin] = &[
     of_x("exp", "The exponential.", |a| unary(a, libm::exp), |a, y, by| derivative::unary(a, y, by, |_, y| y)),
-    of_x("expm1", "`exp(x) - 1`, accurate near 0.", |a| unary(a, libm::expm1), |a, y, by| derivative::unary(a, y, by, |_, y| y + 1.0)),
-    of_x("log", "The natural logarithm; -inf at 0, NaN below.", |a| unary(a, libm::log), |a, y, by| derivative::unary(a, y, by, |x, _| 1.0 / x)),
-    of_x("log1p", "`log(1 + x)`, accurate near 0.", |a| unary(a, libm::log1p), |a, y, by| derivative::unary(a, y, by, |x, _| 1.0 / (1.0 + x))),
-    of_x("sqrt", "The square root; NaN below 0.", |a| unary(a, f64::sqrt), |a, y, by| derivative::unary(a, y, by, |_, y| 0.5 / y)),
+    of_x(
+        "expm1",
+        "`exp(x) - 1`, accurate near 0.",
+        |a| unary(a, libm::expm1),
+        |a, y, by| derivative::unary(a, y, by, |_, y| y + 1.0),
+    ),
+    of_x(
+        "log",
+        "The natural logarithm; -inf at 0, NaN below.",
+        |a| unary(a, libm::log),
+        |a, y, by| derivative::unary(a, y, by, |x, _| 1.0 / x),
+    ),
+    of_x(
+        "log1p",
+        "`log(1 + x)`, accurate near 0.",
+        |a| unary(a, libm::log1p),
+        |a, y, by| derivative::unary(a, y, by, |x, _| 1.0 / (1.0 + x)),
+    ),
+    of_x(
+        "sqrt",
+        "The square root; NaN below 0.",
+        |a| unary(a, f64::sqrt),
+        |a, y, by| derivative::unary(a, y, by, |_, y| 0.5 / y),
+    ),
     function(
         "pow",
         SECTION,
@@ -87,11 +102,36 @@ pub(super) const TABLE: &[Builtin] = &[
     // The bounds first, of which the upper one wins: at a bound the argument moves nothing.
     .pull(|a, z, by| one_of(a.values, &[2, 1, 0], z, by)),
     of_angle("sin", "The sine.", |a| unary(a, libm::sin), |a, y, by| derivative::unary(a, y, by, |x, _| libm::cos(x))),
-    of_angle("cos", "The cosine.", |a| unary(a, libm::cos), |a, y, by| derivative::unary(a, y, by, |x, _| -libm::sin(x))),
-    of_angle("tan", "The tangent.", |a| unary(a, libm::tan), |a, y, by| derivative::unary(a, y, by, |_, y| 1.0 + y * y)),
-    of_x("asin", "The angle in [-pi/2, pi/2] with this sine.", |a| unary(a, libm::asin), |a, y, by| derivative::unary(a, y, by, |x, _| 1.0 / (1.0 - x * x).sqrt())),
-    of_x("acos", "The angle in [0, pi] with this cosine.", |a| unary(a, libm::acos), |a, y, by| derivative::unary(a, y, by, |x, _| -1.0 / (1.0 - x * x).sqrt())),
-    of_x("atan", "The angle in (-pi/2, pi/2) with this tangent.", |a| unary(a, libm::atan), |a, y, by| derivative::unary(a, y, by, |x, _| 1.0 / (1.0 + x * x))),
+    of_angle(
+        "cos",
+        "The cosine.",
+        |a| unary(a, libm::cos),
+        |a, y, by| derivative::unary(a, y, by, |x, _| -libm::sin(x)),
+    ),
+    of_angle(
+        "tan",
+        "The tangent.",
+        |a| unary(a, libm::tan),
+        |a, y, by| derivative::unary(a, y, by, |_, y| 1.0 + y * y),
+    ),
+    of_x(
+        "asin",
+        "The angle in [-pi/2, pi/2] with this sine.",
+        |a| unary(a, libm::asin),
+        |a, y, by| derivative::unary(a, y, by, |x, _| 1.0 / (1.0 - x * x).sqrt()),
+    ),
+    of_x(
+        "acos",
+        "The angle in [0, pi] with this cosine.",
+        |a| unary(a, libm::acos),
+        |a, y, by| derivative::unary(a, y, by, |x, _| -1.0 / (1.0 - x * x).sqrt()),
+    ),
+    of_x(
+        "atan",
+        "The angle in (-pi/2, pi/2) with this tangent.",
+        |a| unary(a, libm::atan),
+        |a, y, by| derivative::unary(a, y, by, |x, _| 1.0 / (1.0 + x * x)),
+    ),
     function(
         "atan2",
         SECTION,
@@ -106,9 +146,24 @@ pub(super) const TABLE: &[Builtin] = &[
             [x / square, -y / square]
         })
     }),
-    of_x("sinh", "The hyperbolic sine.", |a| unary(a, libm::sinh), |a, y, by| derivative::unary(a, y, by, |x, _| libm::cosh(x))),
-    of_x("cosh", "The hyperbolic cosine.", |a| unary(a, libm::cosh), |a, y, by| derivative::unary(a, y, by, |x, _| libm::sinh(x))),
-    of_x("tanh", "The hyperbolic tangent.", |a| unary(a, libm::tanh), |a, y, by| derivative::unary(a, y, by, |_, y| 1.0 - y * y)),
+    of_x(
+        "sinh",
+        "The hyperbolic sine.",
+        |a| unary(a, libm::sinh),
+        |a, y, by| derivative::unary(a, y, by, |x, _| libm::cosh(x)),
+    ),
+    of_x(
+        "cosh",
+        "The hyperbolic cosine.",
+        |a| unary(a, libm::cosh),
+        |a, y, by| derivative::unary(a, y, by, |x, _| libm::sinh(x)),
+    ),
+    of_x(
+        "tanh",
+        "The hyperbolic tangent.",
+        |a| unary(a, libm::tanh),
+        |a, y, by| derivative::unary(a, y, by, |_, y| 1.0 - y * y),
+    ),
     function(
         "deg",
         SECTION,
@@ -118,10 +173,30 @@ pub(super) const TABLE: &[Builtin] = &[
         |a| unary(a, |x| x * (std::f64::consts::PI / 180.0)),
     )
     .pull(|a, y, by| derivative::unary(a, y, by, |_, _| std::f64::consts::PI / 180.0)),
-    of_x("logit", "`log(p / (1 - p))`, for probabilities.", |a| unary(a, logit), |a, y, by| derivative::unary(a, y, by, |x, _| 1.0 / (x * (1.0 - x)))),
-    of_x("expit", "`1 / (1 + exp(-x))`, the inverse of `logit`.", |a| unary(a, expit), |a, y, by| derivative::unary(a, y, by, |_, y| y * (1.0 - y))),
-    of_x("erf", "The error function.", |a| unary(a, libm::erf), |a, y, by| derivative::unary(a, y, by, |x, _| std::f64::consts::FRAC_2_SQRT_PI * libm::exp(-x * x))),
-    of_x("lgamma", "The logarithm of the absolute value of the gamma function.", |a| unary(a, libm::lgamma), |a, y, by| derivative::unary(a, y, by, |x, _| crate::num::digamma(x))),
+    of_x(
+        "logit",
+        "`log(p / (1 - p))`, for probabilities.",
+        |a| unary(a, logit),
+        |a, y, by| derivative::unary(a, y, by, |x, _| 1.0 / (x * (1.0 - x))),
+    ),
+    of_x(
+        "expit",
+        "`1 / (1 + exp(-x))`, the inverse of `logit`.",
+        |a| unary(a, expit),
+        |a, y, by| derivative::unary(a, y, by, |_, y| y * (1.0 - y)),
+    ),
+    of_x(
+        "erf",
+        "The error function.",
+        |a| unary(a, libm::erf),
+        |a, y, by| derivative::unary(a, y, by, |x, _| std::f64::consts::FRAC_2_SQRT_PI * libm::exp(-x * x)),
+    ),
+    of_x(
+        "lgamma",
+        "The logarithm of the absolute value of the gamma function.",
+        |a| unary(a, libm::lgamma),
+        |a, y, by| derivative::unary(a, y, by, |x, _| crate::num::digamma(x)),
+    ),
 ];
 
 /// The derivatives of x^y.

@@ -18,30 +18,54 @@ const fn of_all(name: &'static str, doc: &'static str, f: fn(&Args) -> Result<Va
 }
 
 pub(super) const TABLE: &[Builtin] = &[
-    of_all("sum", "The sum; 0 of nothing.", |a| a.numbers(0).map(|xs| Value::Num(sum(&xs))), |a, y, by| {
-        reduction(a, y, by, |xs, _| vec![1.0; xs.len()])
-    }),
-    of_all("prod", "The product; 1 of nothing.", |a| a.numbers(0).map(|xs| Value::Num(xs.iter().product())), |a, _, by| {
-        let others = |xs: &[f64], i: usize| xs.iter().enumerate().filter(|(j, _)| *j != i).map(|(_, x)| x).product();
-        let xs = a.numbers(0).ok()?;
-        let g = by.number();
-        Some(smallvec![Adjoint::Array((0..xs.len()).map(|i| times(g, others(&xs, i))).collect())])
-    }),
-    of_all("mean", "The arithmetic mean of at least one number.", |a| {
-        a.numbers_from(0, 1).map(|xs| Value::Num(mean(&xs)))
-    }, |a, y, by| reduction(a, y, by, |xs, _| vec![1.0 / xs.len() as f64; xs.len()])),
-    of_all("var", "The sample variance (divisor n - 1) of at least two numbers.", |a| {
-        a.numbers_from(0, 2).map(|xs| Value::Num(variance(&xs)))
-    }, |a, y, by| reduction(a, y, by, |xs, _| spread_slopes(xs, 2.0))),
-    of_all("sd", "The sample standard deviation (divisor n - 1) of at least two numbers.", |a| {
-        a.numbers_from(0, 2).map(|xs| Value::Num(variance(&xs).sqrt()))
-    }, |a, y, by| reduction(a, y, by, |xs, y| spread_slopes(xs, 1.0 / y))),
-    of_all("norm", "The Euclidean length.", |a| a.numbers(0).map(|xs| Value::Num(norm(&xs))), |a, y, by| {
-        reduction(a, y, by, |xs, y| xs.iter().map(|x| x / y).collect())
-    }),
-    of_all("log_sum_exp", "`log(sum(exp(xs)))` without overflow; -inf of nothing.", |a| {
-        a.numbers(0).map(|xs| Value::Num(log_sum_exp(&xs)))
-    }, |a, y, by| reduction(a, y, by, |xs, y| xs.iter().map(|x| libm::exp(x - y)).collect())),
+    of_all(
+        "sum",
+        "The sum; 0 of nothing.",
+        |a| a.numbers(0).map(|xs| Value::Num(sum(&xs))),
+        |a, y, by| reduction(a, y, by, |xs, _| vec![1.0; xs.len()]),
+    ),
+    of_all(
+        "prod",
+        "The product; 1 of nothing.",
+        |a| a.numbers(0).map(|xs| Value::Num(xs.iter().product())),
+        |a, _, by| {
+            let others =
+                |xs: &[f64], i: usize| xs.iter().enumerate().filter(|(j, _)| *j != i).map(|(_, x)| x).product();
+            let xs = a.numbers(0).ok()?;
+            let g = by.number();
+            Some(smallvec![Adjoint::Array((0..xs.len()).map(|i| times(g, others(&xs, i))).collect())])
+        },
+    ),
+    of_all(
+        "mean",
+        "The arithmetic mean of at least one number.",
+        |a| a.numbers_from(0, 1).map(|xs| Value::Num(mean(&xs))),
+        |a, y, by| reduction(a, y, by, |xs, _| vec![1.0 / xs.len() as f64; xs.len()]),
+    ),
+    of_all(
+        "var",
+        "The sample variance (divisor n - 1) of at least two numbers.",
+        |a| a.numbers_from(0, 2).map(|xs| Value::Num(variance(&xs))),
+        |a, y, by| reduction(a, y, by, |xs, _| spread_slopes(xs, 2.0)),
+    ),
+    of_all(
+        "sd",
+        "The sample standard deviation (divisor n - 1) of at least two numbers.",
+        |a| a.numbers_from(0, 2).map(|xs| Value::Num(variance(&xs).sqrt())),
+        |a, y, by| reduction(a, y, by, |xs, y| spread_slopes(xs, 1.0 / y)),
+    ),
+    of_all(
+        "norm",
+        "The Euclidean length.",
+        |a| a.numbers(0).map(|xs| Value::Num(norm(&xs))),
+        |a, y, by| reduction(a, y, by, |xs, y| xs.iter().map(|x| x / y).collect()),
+    ),
+    of_all(
+        "log_sum_exp",
+        "`log(sum(exp(xs)))` without overflow; -inf of nothing.",
+        |a| a.numbers(0).map(|xs| Value::Num(log_sum_exp(&xs))),
+        |a, y, by| reduction(a, y, by, |xs, y| xs.iter().map(|x| libm::exp(x - y)).collect()),
+    ),
     function("cumsum", SECTION, XS, Type::Array, "The running sums.", |a| {
         let mut total = 0.0;
         let running = |x: &f64| {

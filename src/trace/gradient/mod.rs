@@ -62,8 +62,7 @@ impl Graph {
         for t in targets {
             marks[t.node as usize] = Mark::Target;
         }
-        let mut pass =
-            Reverse { graph: self, code, marks, order: Vec::new(), adjoints: FxHashMap::default(), power };
+        let mut pass = Reverse { graph: self, code, marks, order: Vec::new(), adjoints: FxHashMap::default(), power };
         for t in targets {
             pass.visit(t.node);
         }

@@ -79,7 +79,13 @@ impl Reverse<'_> {
     }
 
     /// Hands the derivatives by a distribution's parameters to what they were computed from.
-    pub(super) fn give_params(&mut self, n: NodeId, spec: &DistSpec, dist: &Dist, params: Vec<f64>) -> Result<(), Failure> {
+    pub(super) fn give_params(
+        &mut self,
+        n: NodeId,
+        spec: &DistSpec,
+        dist: &Dist,
+        params: Vec<f64>,
+    ) -> Result<(), Failure> {
         let (g, frame) = (self.graph, self.graph.nodes[n as usize].frame);
         match spec {
             DistSpec::Value(o) => self.give(frame, *o, Adjoint::Array(params)),

@@ -82,7 +82,7 @@ fn chi_squares(drawn: &KeypointOptions, assumed: &KeypointOptions, missing: f64,
 }
 
 fn options(sd: f64, outlier: f64) -> KeypointOptions {
-    KeypointOptions { sd, outlier }
+    KeypointOptions { sd, outlier, offset: 0.0 }
 }
 
 #[test]

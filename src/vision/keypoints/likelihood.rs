@@ -2,7 +2,8 @@
 //!
 //! Pure arithmetic on positions in pixels. A detection `z` of a joint at `p` has the density
 //! `(1 - e) N(z; p, s^2 I) + e / area` with `e = 1 - c (1 - outlier)` for a detector's confidence `c`: certain detections are
-//! off with the probability `outlier`, worthless ones tell nothing. Invariant: finite and never NaN, as `e > 0`.
+//! off with the probability `outlier`, worthless ones tell nothing. `s^2 = sd^2 + offset^2`: the model's joint may be off, too, and
+//! where the joint really is then lies between it and the detection. Invariant: finite and never NaN, as `e > 0`.
 
 use crate::rng::Stream;
 use crate::vision::VisionError;
@@ -14,11 +15,14 @@ pub struct KeypointOptions {
     pub sd: f64,
     /// The probability that a detection of full confidence is off; strictly between 0 and 1.
     pub outlier: f64,
+    /// How far the joint may be from where the model has it, as a standard deviation along each axis, in percent of the
+    /// diagonal; not negative.
+    pub offset: f64,
 }
 
 impl Default for KeypointOptions {
     fn default() -> Self {
-        KeypointOptions { sd: 1.5, outlier: 0.05 }
+        KeypointOptions { sd: 1.5, outlier: 0.05, offset: 0.0 }
     }
 }
 
@@ -28,7 +32,10 @@ impl Default for KeypointOptions {
 pub struct KeypointLikelihood {
     width: f64,
     height: f64,
+    /// Of a detection about the model's joint: both spreads together.
     sd: f64,
+    /// Of the joint about the model's.
+    offset: f64,
     outlier: f64,
     log_peak: f64,
     log_area: f64,
@@ -45,7 +52,13 @@ impl KeypointLikelihood {
             false => Err(VisionError::Range { name, rule: "positive and less than 1e9", value }),
         };
         let (width, height) = (positive("width", width)?, positive("height", height)?);
-        let sd = positive("sd", options.sd)? / 100.0 * (width * width + height * height).sqrt();
+        let percent = (width * width + height * height).sqrt() / 100.0;
+        let offset = match options.offset {
+            0.0 => 0.0,
+            o => positive("offset", o)? * percent,
+        };
+        let own = positive("sd", options.sd)? * percent;
+        let sd = (own * own + offset * offset).sqrt();
         // Whose square is still a number.
         let sd = sd.max(1e-100);
         let outlier = options.outlier;
@@ -53,10 +66,10 @@ impl KeypointLikelihood {
             return Err(VisionError::Range { name: "outlier", rule: "strictly between 0 and 1", value: outlier });
         }
         let log_peak = -libm::log(2.0 * std::f64::consts::PI * sd * sd);
-        Ok(KeypointLikelihood { width, height, sd, outlier, log_peak, log_area: libm::log(width * height) })
+        Ok(KeypointLikelihood { width, height, sd, offset, outlier, log_peak, log_area: libm::log(width * height) })
     }
 
-    /// The standard deviation of a good detection along each axis, in pixels.
+    /// The standard deviation of a good detection about the model's joint along each axis, in pixels.
     pub fn sd(&self) -> f64 {
         self.sd
     }
@@ -93,6 +106,20 @@ impl KeypointLikelihood {
         [0, 1].map(|i| share * (seen[i] - joint[i]) / (self.sd * self.sd))
     }
 
+    /// Where the joint is, given a detection and where the model has it: the mean, and the variance along an axis (the mean of
+    /// the two).
+    pub fn located(&self, seen: [f64; 2], confidence: f64, joint: [f64; 2]) -> ([f64; 2], f64) {
+        let (near, off) = self.parts(seen, confidence, Some(joint));
+        let share = if near == f64::NEG_INFINITY { 0.0 } else { 1.0 / (1.0 + libm::exp(off - near)) };
+        let between = self.offset * self.offset;
+        let weight = between / (self.sd * self.sd);
+        let shift = [0, 1].map(|i| weight * (seen[i] - joint[i]));
+        // Of the mixture of a good detection and none: within both, and between them.
+        let within = share * between * (1.0 - weight) + (1.0 - share) * between;
+        let apart = share * (1.0 - share) * 0.5 * (shift[0] * shift[0] + shift[1] * shift[1]);
+        ([0, 1].map(|i| joint[i] + share * shift[i]), within + apart)
+    }
+
     /// A detection drawn.
     pub fn sample(&self, confidence: f64, joint: Option<[f64; 2]>, rng: &mut Stream) -> [f64; 2] {
         match joint {
@@ -110,7 +137,7 @@ mod tests {
     use crate::rng::{Purpose, StreamKey};
 
     fn model(sd: f64, outlier: f64) -> KeypointLikelihood {
-        KeypointLikelihood::new(400.0, 300.0, &KeypointOptions { sd, outlier }).unwrap()
+        KeypointLikelihood::new(400.0, 300.0, &KeypointOptions { sd, outlier, offset: 0.0 }).unwrap()
     }
 
     #[test]
@@ -169,6 +196,38 @@ mod tests {
     }
 
     #[test]
+    fn a_joint_lies_between_the_model_and_the_detection() {
+        let options = KeypointOptions { sd: 0.6, outlier: 0.1, offset: 0.8 };
+        let m = KeypointLikelihood::new(400.0, 300.0, &options).unwrap();
+        assert!((m.sd() - 5.0).abs() < 1e-12, "both spreads: 3 and 4 pixels");
+        let (seen, joint) = ([103.0, 96.0], [100.0, 100.0]);
+        // By quadrature over where the joint is: N(q; joint, 4) times the density of the detection about q.
+        let own = KeypointLikelihood::new(400.0, 300.0, &KeypointOptions { offset: 0.0, ..options.clone() }).unwrap();
+        for confidence in [1.0, 0.3, 0.0] {
+            let (mut mass, mut mean, mut square) = (0.0, [0.0; 2], 0.0);
+            for i in -80..=80 {
+                for j in -80..=80 {
+                    let d = [f64::from(i) * 0.25, f64::from(j) * 0.25];
+                    let q = [joint[0] + d[0], joint[1] + d[1]];
+                    let prior = libm::exp(-(d[0] * d[0] + d[1] * d[1]) / 32.0);
+                    let w = prior * libm::exp(own.log_density(seen, confidence, Some(q)));
+                    mass += w;
+                    (mean[0], mean[1]) = (mean[0] + w * q[0], mean[1] + w * q[1]);
+                    square += w * (d[0] * d[0] + d[1] * d[1]);
+                }
+            }
+            let mean = mean.map(|x| x / mass);
+            let shift = [mean[0] - joint[0], mean[1] - joint[1]];
+            let variance = 0.5 * (square / mass - shift[0] * shift[0] - shift[1] * shift[1]);
+            let (at, found) = m.located(seen, confidence, joint);
+            assert!((at[0] - mean[0]).abs() < 1e-3 && (at[1] - mean[1]).abs() < 1e-3, "{at:?} {mean:?}");
+            assert!((found - variance).abs() < 1e-2, "{found} {variance}");
+        }
+        let exact = model(1.0, 0.05);
+        assert_eq!(exact.located(seen, 1.0, joint), (joint, 0.0), "without an offset the model's joint is the joint");
+    }
+
+    #[test]
     fn draws_have_the_stated_spread() {
         let m = model(1.0, 0.2);
         let mut rng = StreamKey::new(3, 0, Purpose::PREDICT).stream(0, 0, 0);
@@ -192,7 +251,9 @@ mod tests {
 
     #[test]
     fn options_are_checked() {
-        let of = |w: f64, sd: f64, outlier: f64| KeypointLikelihood::new(w, 10.0, &KeypointOptions { sd, outlier });
+        let of = |w: f64, sd: f64, outlier: f64| {
+            KeypointLikelihood::new(w, 10.0, &KeypointOptions { sd, outlier, offset: 0.0 })
+        };
         assert!(of(10.0, 1.0, 0.1).is_ok());
         for (w, sd, outlier) in [
             (0.0, 1.0, 0.1),

@@ -58,13 +58,7 @@ impl Adaptation {
     }
 
     /// The step size to use now, found by trial when there is none yet.
-    pub fn step(
-        &mut self,
-        system: &mut System,
-        here: &Point,
-        adapting: bool,
-        rng: &mut Stream,
-    ) -> TraceResult<f64> {
+    pub fn step(&mut self, system: &mut System, here: &Point, adapting: bool, rng: &mut Stream) -> TraceResult<f64> {
         let signature = system.signature();
         if signature != self.signature {
             // Other choices than before: what was learnt belongs to those that are still there.

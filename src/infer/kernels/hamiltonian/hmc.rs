@@ -47,14 +47,17 @@ impl Kernel for Hmc {
                 }
             }
         }
-        let ratio = if there { point.log_density - here.log_density + energy - system::kinetic(&p, mass) } else { f64::NEG_INFINITY };
+        let ratio = if there {
+            point.log_density - here.log_density + energy - system::kinetic(&p, mass)
+        } else {
+            f64::NEG_INFINITY
+        };
         let accepted = there && accepts(ratio, &mut rng);
         let accepted = system.settle(accepted.then_some(&point))?;
         if at.adapting {
             self.adaptation.learn(libm::exp(ratio.min(0.0)), if accepted { &point.y } else { &here.y });
         }
-        // Not of NaN.
-        let divergent = !(ratio > -DIVERGENT);
+        let divergent = ratio.is_nan() || ratio <= -DIVERGENT;
         Ok(Outcome { failed: u32::from(!there), divergent: u32::from(divergent), ..Outcome::one(accepted) })
     }
 }

@@ -86,8 +86,7 @@ impl Walk<'_, '_> {
         };
         let log_weight = self.energy - (system::kinetic(&momentum, self.mass) - point.log_density);
         self.acceptance += libm::exp(log_weight.min(0.0));
-        // Not of NaN.
-        if !(log_weight > -DIVERGENT) {
+        if log_weight.is_nan() || log_weight <= -DIVERGENT {
             self.divergent = true;
             return Ok(None);
         }

@@ -129,7 +129,11 @@ impl<'a> System<'a> {
         match to {
             Some(point) => {
                 let there = self.go(point.y.clone(), false)?.is_some();
-                if there { self.trace.commit() } else { self.trace.rollback() }
+                if there {
+                    self.trace.commit()
+                } else {
+                    self.trace.rollback()
+                }
                 Ok(there)
             }
             None => {

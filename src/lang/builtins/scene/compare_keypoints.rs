@@ -10,7 +10,7 @@ use crate::diag::nearest;
 use crate::geom::Landmark;
 use crate::lang::adjoint::Adjoint;
 use crate::lang::builtins::{Builtin, Type, opt};
-use crate::lang::value::{Likelihood, Value};
+use crate::lang::value::{Likelihood, Located, Value};
 use crate::render::{Camera, View};
 use crate::vision::keypoints::{KeypointLikelihood, KeypointOptions, matching};
 use smallvec::smallvec;
@@ -23,18 +23,24 @@ pub(super) const TABLE: &[Builtin] = &[native(
         SEEN,
         opt("sd", Type::Num, "1.5", "The spread of a good detection along each axis.").unit("percent of the diagonal"),
         opt("outlier", Type::Num, "0.05", "The share of detections of full confidence that are off."),
+        opt("offset", Type::Num, "0", "The spread of a joint about where the scene has it, along each axis: bodies differ.")
+            .unit("percent of the diagonal"),
     ],
     Type::Likelihood,
     "The density of detected joints: each near its landmark or anywhere in the picture; what was not found says nothing.",
     |a| {
-        let options = KeypointOptions { sd: a.positive_or(1, 1.5)?, outlier: a.num_or(2, 0.05)? };
+        let (sd, outlier, offset) = (a.positive_or(1, 1.5)?, a.num_or(2, 0.05)?, a.num_or(3, 0.0)?);
+        let options = KeypointOptions { sd, outlier, offset };
         if !(options.outlier > 0.0 && options.outlier < 1.0) {
             return Err(a.outside(2, "strictly between 0 and 1"));
+        }
+        if !(options.offset >= 0.0 && options.offset.is_finite()) {
+            return Err(a.outside(3, "not negative and finite"));
         }
         likelihood(KeypointsOf { view: view(a)?, options })
     },
 )
-.pull(|_, _, by| Some(smallvec![by.clone(), Adjoint::Unknown, Adjoint::Unknown]))];
+.pull(|_, _, by| Some(smallvec![by.clone(), Adjoint::Unknown, Adjoint::Unknown, Adjoint::Unknown]))];
 
 #[derive(Debug)]
 struct KeypointsOf {
@@ -68,6 +74,25 @@ impl Likelihood for KeypointsOf {
         Ok(sum)
     }
 
+    /// The landmarks that were detected, between where the scene has them and where they were seen.
+    fn located(&self, observed: &Value) -> Vec<Located> {
+        let mut all = Vec::new();
+        let landmarks = self.view.solid().landmarks();
+        let add = |term: Term| {
+            let Some(joint) = term.joint else { return };
+            let (at, variance) = term.model.located(term.seen, term.confidence, joint);
+            let (width, height) = term.size;
+            all.push(Located {
+                name: Arc::clone(&landmarks[term.landmark].name),
+                at: [at[0] / width, at[1] / height],
+                variance: variance / (width * width + height * height),
+            });
+        };
+        // What cannot be compared has failed before.
+        let _ = self.each(observed, add);
+        all
+    }
+
     /// By the x, y and z of each landmark.
     fn gradient(&self, observed: &Value) -> Option<Adjoint> {
         let (camera, landmarks) = (self.view.camera(), self.view.solid().landmarks());
@@ -94,6 +119,8 @@ struct Term<'a> {
     joint: Option<[f64; 2]>,
     /// Pixels of the picture in one of the camera's.
     scale: [f64; 2],
+    /// The width and height of the picture.
+    size: (f64, f64),
 }
 
 impl KeypointsOf {
@@ -112,11 +139,20 @@ impl KeypointsOf {
         let found = matching(seen, &names, near).map_err(|e| format!("scene.keypoints: {e}"))?;
         let model = KeypointLikelihood::new(f64::from(size.0), f64::from(size.1), &self.options)
             .map_err(|e| format!("scene.keypoints: {e}"))?;
+        let whole = (f64::from(size.0), f64::from(size.1));
         let scale = [f64::from(size.0) / f64::from(camera.width), f64::from(size.1) / f64::from(camera.height)];
         for (p, at) in seen.points().iter().zip(found) {
             let Some((landmark, l)) = at.and_then(|i| Some((i, landmarks.get(i)?))) else { continue };
             let joint = project(l, camera, size);
-            f(Term { model: &model, seen: seen.position(p, size), confidence: p.confidence, landmark, joint, scale });
+            f(Term {
+                model: &model,
+                seen: seen.position(p, size),
+                confidence: p.confidence,
+                landmark,
+                joint,
+                scale,
+                size: whole,
+            });
         }
         Ok(())
     }

@@ -35,7 +35,17 @@ const fn native(
     doc: &'static str,
     f: fn(&Args) -> Result<Value, Fault>,
 ) -> Builtin {
-    Builtin { name, module: "scene", section, args, variadic: false, returns, doc, kind: Kind::Function(f), derivative: Derivative::Unknown }
+    Builtin {
+        name,
+        module: "scene",
+        section,
+        args,
+        variadic: false,
+        returns,
+        doc,
+        kind: Kind::Function(f),
+        derivative: Derivative::Unknown,
+    }
 }
 
 /// All of them.

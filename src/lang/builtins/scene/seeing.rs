@@ -2,8 +2,8 @@
 
 use super::shapes::vector;
 use super::{CAMERA, CameraValue, SOLID, SolidValue, VIEW, ViewValue, native};
-use crate::lang::builtins::{Builtin, Type, arg, opt};
 use crate::lang::adjoint::Adjoint;
+use crate::lang::builtins::{Builtin, Type, arg, opt};
 use crate::lang::error::Fault;
 use crate::lang::value::Value;
 use crate::render::{Camera, Projection, View};
