@@ -264,6 +264,7 @@ fn choices_that_appear_and_vanish() {
         with_mh!("hmc($continuous, steps = 3)"),
         with_mh!("mala($continuous)"),
         with_mh!("nuts($continuous)"),
+        with_mh!("slice($continuous)"),
         with_mh!("block(@x/**)"),
     ];
     all_balanced(&STRUCTURE, 20_000, &kernels);
@@ -344,6 +345,8 @@ fn bounds_that_depend_on_another_choice() {
         "hmc(@**, steps = 3)",
         "mala(@**)",
         "nuts(@**)",
+        "slice(one(@**))",
+        with_mh!("slice(@p1, width = 2)"),
     ];
     all_balanced(&SUPPORT, 20_000, &kernels);
 }

@@ -33,8 +33,8 @@ fn conjugate_normal_by_drift() {
 }
 
 #[test]
-fn conjugate_normal_by_hamiltonian_kernels() {
-    for kernel in ["hmc(@x, steps = 4)", "mala(@x)", "nuts(@x)"] {
+fn conjugate_normal_by_hamiltonian_kernels_and_slices() {
+    for kernel in ["hmc(@x, steps = 4)", "mala(@x)", "nuts(@x)", "slice(@x)", "slice(@x, width = 0.3)"] {
         conjugate_normal(kernel);
     }
 }

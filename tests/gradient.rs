@@ -221,6 +221,38 @@ fn vectors_and_constrained_choices() {
 }
 
 #[test]
+fn covariances() {
+    let at = "[0, 0.4, 1.1, 2, 2.3]";
+    for cov in [
+        "sq_exp(l, s)",
+        "matern32(l, s)",
+        "matern52(l, s)",
+        "periodic(1.7 + l, 1, s)",
+        "sq_exp(l, s) + white(0.3 + s)",
+        "sq_exp(2, s) * periodic(1.3, l)",
+    ] {
+        for choice in [
+            format!("assume f ~ gp(mean = m, cov = {cov}, at = {at}); observe normal(f, 0.3) = [1, 2, 0, 1, 1];"),
+            format!("observe gp(mean = m, cov = {cov} + white(0.2), at = {at}) = [1, 2, 0, 1, 1];"),
+            format!(
+                "assume f ~ gp(mean = m, cov = {cov} + white(0.2), at = {at}, centred = true); observe normal(f, 0.3) = [1, 2, 0, 1, 1];"
+            ),
+        ] {
+            check(&format!("assume l ~ gamma(9, 9); assume s ~ gamma(9, 9); assume m ~ normal(0, 1); {choice}"));
+        }
+    }
+    for p in [
+        "assume r ~ uniform(-0.8, 0.8); observe mv_normal([0, 1], cov = [[1, r], [r, 2]]) = [0.3, 0.2];",
+        "assume r ~ gamma(5, 5); assume q ~ normal(0, 1); observe mv_normal([q, 1], chol = [[r, 0], [q, 2]]) = [0.3, 0.2];",
+        "assume l ~ lkj(3, 2); observe mv_normal([0, 1, 0], chol = l) = [0.3, 0.2, 1];",
+        "assume r ~ gamma(5, 5); assume v ~ mv_normal([0, 1], chol = [[r, 0], [0.3, r * r]], whitened = true);
+         observe normal(v, 0.4) = [1, 0];",
+    ] {
+        check(p);
+    }
+}
+
+#[test]
 fn structure_passes_derivatives_through() {
     for p in [
         "fn line(a, b = 2) { a * 3 + b } assume x ~ normal(0, 1); factor(-line(x) ** 2 / 9 + line(b = x, a = 1));",
@@ -269,12 +301,11 @@ fn bodies_with_detected_joints() {
 
 #[test]
 fn what_has_no_derivative_says_so() {
-    let text =
-        "assume l ~ gamma(2, 2); assume f ~ gp(mean = 0, cov = sq_exp(l), at = [0, 1]); observe normal(f, 1) = [0, 1];";
+    let text = "assume x ~ iid(normal(0, 1), 3); factor(sum(map(exp, x)));";
     let model = Program::parse(text).unwrap().compile().unwrap();
     let mut trace = model.simulate(1, 0).unwrap();
     let selection = trace.select(&Selector::All);
     let targets = trace.targets(selection).to_vec();
     let e = trace.gradient(&targets, 1.0, &mut Vec::new()).unwrap_err();
-    assert!(e.message.contains("`gp` by its argument `cov`"), "{}", e.message);
+    assert!(e.message.contains("what this map gives"), "{}", e.message);
 }

@@ -118,6 +118,70 @@ impl Covariance {
         }
     }
 
+    /// How many parameters it has: of a sum or product those of the left side, then of the right.
+    pub fn param_count(&self) -> usize {
+        match self {
+            SqExp { .. } | Matern32 { .. } | Matern52 { .. } => 2,
+            Periodic { .. } => 3,
+            White { .. } => 1,
+            Sum(two) | Product(two) => two.0.param_count() + two.1.param_count(),
+        }
+    }
+
+    /// Adds the derivatives of `by` times the covariance of two points at this distance, or of a point with itself, by the
+    /// parameters in the order of the constructors.
+    pub fn pull(&self, d: Option<f64>, by: f64, out: &mut [f64]) {
+        let k = d.map_or_else(|| self.variance(), |d| self.at_distance(d));
+        // By the standard deviation; and by the length, of r with dk/dr = -slope.
+        let mut add = |i: usize, g: f64| {
+            if let Some(o) = out.get_mut(i) {
+                *o += by * g;
+            }
+        };
+        let far = d.unwrap_or(0.0);
+        match self {
+            SqExp { length, sd } => {
+                let r = far / length;
+                add(0, k * r * r / length);
+                add(1, 2.0 * k / sd);
+            }
+            Matern32 { length, sd } => {
+                let r = (3f64.sqrt() * (far / length)).min(1e3);
+                add(0, sd * sd * r * r * libm::exp(-r) / length);
+                add(1, 2.0 * k / sd);
+            }
+            Matern52 { length, sd } => {
+                let r = (5f64.sqrt() * (far / length)).min(1e3);
+                add(0, sd * sd * r * r * (1.0 + r) * libm::exp(-r) / (3.0 * length));
+                add(1, 2.0 * k / sd);
+            }
+            Periodic { period, length, sd } => {
+                let angle = core::f64::consts::PI * (libm::fmod(far, *period) / period);
+                let s = libm::sin(angle) / length;
+                // The distance in periods, whole ones too, moves with the period.
+                add(0, 4.0 * k * s * libm::cos(angle) / length * core::f64::consts::PI * far / (period * period));
+                add(1, 4.0 * k * s * s / length);
+                add(2, 2.0 * k / sd);
+            }
+            White { sd } => {
+                if d.is_none() {
+                    add(0, 2.0 * sd);
+                }
+            }
+            Sum(two) => {
+                let (left, right) = out.split_at_mut(two.0.param_count().min(out.len()));
+                two.0.pull(d, by, left);
+                two.1.pull(d, by, right);
+            }
+            Product(two) => {
+                let value = |c: &Covariance| d.map_or_else(|| c.variance(), |d| c.at_distance(d));
+                let (left, right) = out.split_at_mut(two.0.param_count().min(out.len()));
+                two.0.pull(d, by * value(&two.1), left);
+                two.1.pull(d, by * value(&two.0), right);
+            }
+        }
+    }
+
     /// The covariance matrix of values at these points.
     pub fn matrix(&self, at: &[f64]) -> DMatrix<f64> {
         let packed = self.packed(at, 0.0);

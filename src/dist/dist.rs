@@ -184,7 +184,7 @@ impl Dist {
     }
 
     /// The same distribution with values as its stored form: what elements of a product are.
-    pub(super) fn centred(self) -> Dist {
+    pub(crate) fn centred(self) -> Dist {
         match self {
             Dist::Gp(d) if d.is_stored_whitened() => Dist::Gp(Arc::new(d.to_centred())),
             Dist::MvNormal(d) if d.is_stored_whitened() => Dist::MvNormal(Arc::new(d.to_centred())),

@@ -55,6 +55,11 @@ impl Factor {
         self.n
     }
 
+    /// Entry (i, i).
+    pub fn diagonal(&self, i: usize) -> f64 {
+        self.packed[row(i) + i]
+    }
+
     /// ln det L.
     pub fn log_det(&self) -> f64 {
         self.log_diagonal
@@ -73,6 +78,26 @@ impl Factor {
             out.iter_mut().zip(this).for_each(|(o, l)| *o += l * g);
         }
         out
+    }
+
+    /// From the derivatives by the packed entries of L to those by the entries of the symmetric matrix K = L L', its lower triangle
+    /// packed: what lies off the diagonal stands for both of its places (Giles 2008; Murray 2016).
+    pub fn pull_cholesky(&self, by: &[f64]) -> Vec<f64> {
+        let n = self.n;
+        let entry = |m: &[f64], i: usize, j: usize| m[row(i) + j];
+        // Columns of P = the lower triangle of L' by, its diagonal halved.
+        let mut columns: Vec<Vec<f64>> = vec![vec![0.0; n]; n];
+        for (j, column) in columns.iter_mut().enumerate() {
+            for (i, p) in column.iter_mut().enumerate().skip(j) {
+                let sum: f64 = (i..n).map(|k| entry(&self.packed, k, i) * entry(by, k, j)).sum();
+                *p = if i == j { 0.5 * sum } else { sum };
+            }
+        }
+        // S = L^-T P L^-1.
+        let half: Vec<Vec<f64>> = columns.into_iter().map(|c| self.solve_transposed(c)).collect();
+        let rows: Vec<Vec<f64>> = (0..n).map(|i| self.solve_transposed(half.iter().map(|c| c[i]).collect())).collect();
+        let packed = |i: usize| (0..=i).map(move |j| (i, j));
+        (0..n).flat_map(packed).map(|(i, j)| if i == j { rows[i][i] } else { rows[i][j] + rows[j][i] }).collect()
     }
 
     /// L^-1 (x - mean).

@@ -60,6 +60,23 @@ impl Gaussian {
         Some(Gradient { x: by_mean.iter().map(|g| -g).collect(), params: by_mean })
     }
 
+    /// The derivatives by the packed entries of L: of the log density of a value that is stored as such; of one stored as noise,
+    /// of what has these derivatives by the value.
+    pub fn factor_gradient(&self, stored: &Datum, by_value: &[f64]) -> Option<Vec<f64>> {
+        let outer = |a: &[f64], z: &[f64]| -> Vec<f64> {
+            a.iter().enumerate().flat_map(|(i, a)| z[..=i].iter().map(move |z| a * z)).collect()
+        };
+        if self.whitened {
+            return stored.with_numbers(self.size(), |z| outer(by_value, z));
+        }
+        let z = self.whiten(stored)?;
+        let mut by = outer(&self.factor.solve_transposed(z.clone()), &z);
+        for i in 0..self.size() {
+            by[i * (i + 1) / 2 + i] -= 1.0 / self.factor.diagonal(i);
+        }
+        Some(by)
+    }
+
     /// The noise behind a finite vector.
     pub fn whiten(&self, x: &Datum) -> Option<Vec<f64>> {
         x.with_numbers(self.size(), |x| self.factor.whiten(&self.mean, x)).filter(|z| z.iter().all(|z| z.is_finite()))

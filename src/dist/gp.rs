@@ -43,6 +43,27 @@ impl Gp {
         Gp(self.0.centred())
     }
 
+    /// The derivatives by the parameters of its covariance function, made at these points: of the log density of a stored value;
+    /// of one stored as noise, of what has these derivatives by the value.
+    pub fn covariance_gradient(
+        &self,
+        cov: &Covariance,
+        at: &[f64],
+        stored: &super::Datum,
+        by_value: &[f64],
+    ) -> Option<Vec<f64>> {
+        let by = self.0.factor.pull_cholesky(&self.0.factor_gradient(stored, by_value)?);
+        let mut out = vec![0.0; cov.param_count()];
+        let mut entries = by.into_iter();
+        for (i, x) in at.iter().enumerate() {
+            for y in &at[..i] {
+                cov.pull(Some((x - y).abs()), entries.next()?, &mut out);
+            }
+            cov.pull(None, entries.next()? * (1.0 + JITTER), &mut out);
+        }
+        Some(out)
+    }
+
     /// The derivatives by the white noise behind a value, from those by the value.
     pub fn pull_noise(&self, by: &[f64]) -> Vec<f64> {
         self.0.factor.transposed_times(by)

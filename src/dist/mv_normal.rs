@@ -63,6 +63,24 @@ impl MvNormal {
         MvNormal(self.0.centred())
     }
 
+    /// The derivatives by the entries of the covariance (both triangles) or, with `chol`, of its factor, as rows: of the log density
+    /// of a stored value; of one stored as noise, of what has these derivatives by the value.
+    pub fn matrix_gradient(&self, chol: bool, stored: &super::Datum, by_value: &[f64]) -> Option<Vec<Vec<f64>>> {
+        let by = self.0.factor_gradient(stored, by_value)?;
+        let n = self.0.size();
+        let entry = |m: &[f64], i: usize, j: usize| m[i * (i + 1) / 2 + j];
+        if chol {
+            let cell = |i: usize, j: usize| if j <= i { entry(&by, i, j) } else { 0.0 };
+            return Some((0..n).map(|i| (0..n).map(|j| cell(i, j)).collect()).collect());
+        }
+        let by = self.0.factor.pull_cholesky(&by);
+        let cell = |i: usize, j: usize| match i == j {
+            true => entry(&by, i, i),
+            false => 0.5 * entry(&by, i.max(j), i.min(j)),
+        };
+        Some((0..n).map(|i| (0..n).map(|j| cell(i, j)).collect()).collect())
+    }
+
     /// The derivatives by the white noise behind a value, from those by the value.
     pub fn pull_noise(&self, by: &[f64]) -> Vec<f64> {
         self.0.factor.transposed_times(by)

@@ -6,6 +6,7 @@ mod elliptical;
 mod gibbs;
 mod hamiltonian;
 mod mh;
+mod slice;
 
 pub use block::Block;
 pub use drift::Drift;
@@ -13,3 +14,4 @@ pub use elliptical::Elliptical;
 pub use gibbs::Gibbs;
 pub use hamiltonian::{Hmc, Nuts};
 pub use mh::Mh;
+pub use slice::Slice;

@@ -6,7 +6,7 @@ use super::draws::{DrawRow, KernelStats, Sink};
 use super::expr::{Scope, evaluate};
 use super::init::{StartError, start_of, starts};
 use super::kernel::{At, Kernel};
-use super::kernels::{Block, Drift, Elliptical, Gibbs, Hmc, Mh, Nuts};
+use super::kernels::{Block, Drift, Elliptical, Gibbs, Hmc, Mh, Nuts, Slice};
 use super::population::Population;
 use super::record::Recorder;
 use super::selection::{fail, scope, selector};
@@ -472,23 +472,13 @@ impl Runner<'_> {
                     "hmc" => Box::new(Hmc::new(scope, self.setting(args, "steps", 10, 10_000)?, None)),
                     "mala" => Box::new(Hmc::new(scope, 1, None)),
                     "nuts" => Box::new(Nuts::new(scope, self.setting(args, "max_depth", 10, 20)?)),
-                    "drift" => {
-                        let scale = match args.get(1) {
-                            None => None,
-                            Some(a) => match self.value(&a.value)? {
-                                Value::Num(s) if s > 0.0 => Some(s),
-                                v => {
-                                    let message = format!("drift: `scale` must be positive, got {v}");
-                                    return Err(fail(a.value.span, message).into());
-                                }
-                            },
-                        };
-                        Box::new(Drift::new(scope, scale))
-                    }
+                    "drift" => Box::new(Drift::new(scope, self.length(args, name, "scale")?)),
+                    "slice" => Box::new(Slice::new(scope, self.length(args, name, "width")?)),
                     _ => {
                         let message = format!("the kernel `{name}` is not available yet in this version");
                         let mut e = fail(e.span, message);
-                        e.hint = Some("those that are: mh, block, drift, gibbs, elliptical, hmc, mala, nuts".into());
+                        e.hint =
+                            Some("those that are: mh, block, drift, gibbs, elliptical, hmc, mala, nuts, slice".into());
                         return Err(e.into());
                     }
                 };
@@ -511,6 +501,15 @@ impl Runner<'_> {
         self.step += 1;
         self.progress.steps.fetch_add(1, Ordering::Relaxed);
         Ok(if self.is_over() { Flow::End } else { Flow::Next })
+    }
+
+    /// A positive number that a kernel takes besides its selection, if it is given.
+    fn length(&mut self, args: &[Arg], kernel: &str, name: &str) -> Result<Option<f64>, Box<RunError>> {
+        let Some(e) = argument(args, 1, name) else { return Ok(None) };
+        match self.value(e)? {
+            Value::Num(s) if s > 0.0 => Ok(Some(s)),
+            v => Err(fail(e.span, format!("{kernel}: `{name}` must be positive, got {v}"))),
+        }
     }
 
     /// A whole number that a kernel takes besides its selection.

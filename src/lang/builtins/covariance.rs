@@ -1,7 +1,8 @@
 //! Covariance functions of Gaussian processes, as values: `sq_exp(0.5) + white(0.01)`.
 
-use super::{Arg, Args, Builtin, Type, arg, function, opt};
+use super::{Arg, Args, Builtin, Pulled, Type, arg, function, opt};
 use crate::dist::{Covariance, ParamError};
+use crate::lang::adjoint::Adjoint;
 use crate::lang::error::Fault;
 use crate::lang::value::{Object, Value};
 use std::any::Any;
@@ -25,9 +26,21 @@ impl Object for CovarianceValue {
         let other = other.downcast::<CovarianceValue>()?;
         Some(Ok(Value::object(CovarianceValue(self.0.clone() * other.0.clone()))))
     }
+
+    fn pull_product(&self, other: &Value, by: &Adjoint) -> Option<[Adjoint; 2]> {
+        CovarianceValue::pull_both(&Value::object(self.clone()), other, by)
+    }
 }
 
 impl CovarianceValue {
+    /// The adjoints of both sides of a sum or product.
+    pub(super) fn pull_both(x: &Value, y: &Value, by: &Adjoint) -> Option<[Adjoint; 2]> {
+        let (x, y) = (x.downcast::<CovarianceValue>()?, y.downcast::<CovarianceValue>()?);
+        let (left, right) = (x.0.param_count(), y.0.param_count());
+        let all = by.numbers(left + right);
+        Some([Adjoint::Array(all[..left].to_vec()), Adjoint::Array(all[left..].to_vec())])
+    }
+
     /// The sum of two covariance functions, if `x` and `y` are such.
     pub(super) fn sum(x: &Value, y: &Value) -> Option<Value> {
         let (x, y) = (x.downcast::<CovarianceValue>()?, y.downcast::<CovarianceValue>()?);
@@ -44,7 +57,7 @@ const fn covariance(
     doc: &'static str,
     f: fn(&Args) -> Result<Value, Fault>,
 ) -> Builtin {
-    function(name, SECTION, args, Type::Covariance, doc, f)
+    function(name, SECTION, args, Type::Covariance, doc, f).pull(pull_params)
 }
 
 pub(super) const TABLE: &[Builtin] = &[
@@ -74,6 +87,12 @@ pub(super) const TABLE: &[Builtin] = &[
         value(Covariance::white(a.num_or(0, 1.0)?))
     }),
 ];
+
+/// The adjoint of a covariance has a number for each parameter, in the order of the arguments.
+fn pull_params(a: &Args, y: &Value, by: &Adjoint) -> Option<Pulled> {
+    let n = y.downcast::<CovarianceValue>()?.0.param_count();
+    Some(by.numbers(n).into_iter().take(a.values.len()).map(Adjoint::Num).collect())
+}
 
 fn value(made: Result<Covariance, ParamError>) -> Result<Value, Fault> {
     made.map(|c| Value::object(CovarianceValue(c))).map_err(|e| Fault::domain(e.to_string()))

@@ -10,20 +10,8 @@ const CHOICES: &str = "Selections and starts";
 const MONITORS: &str = "Monitors and reports";
 
 /// What this version checks and documents but cannot run.
-pub(super) const PLANNED: &[&str] = &[
-    "slice",
-    "knn",
-    "delayed",
-    "temper",
-    "smc",
-    "abc",
-    "optimize",
-    "marginal",
-    "acceptance",
-    "rhat",
-    "ess",
-    "snapshot",
-];
+pub(super) const PLANNED: &[&str] =
+    &["knn", "delayed", "temper", "smc", "abc", "optimize", "marginal", "acceptance", "rhat", "ess", "snapshot"];
 
 const fn name(
     name: &'static str,
@@ -96,7 +84,15 @@ pub(super) const TABLE: &[Builtin] = &[
     name(
         "slice",
         KERNELS,
-        &[SEL, opt("width", Type::Num, "1", "The first width, in the unconstrained space; warm-up adapts it.")],
+        &[
+            SEL,
+            opt(
+                "width",
+                Type::Num,
+                "learnt",
+                "The width of a step out, in the unconstrained space; without it, 1, and warm-up adapts it.",
+            ),
+        ],
         Type::Kernel,
         "Slice sampling of one number at a time with stepping out (Neal 2003).",
     ),

@@ -22,6 +22,7 @@ pub mod scene;
 mod table;
 
 pub use args::Args;
+pub use covariance::CovarianceValue;
 pub use derivative::{Derivative, Pull, Pulled};
 pub use table::{Constant, Table};
 

@@ -21,8 +21,14 @@ const fn infix(name: &'static str, returns: Type, doc: &'static str, f: fn(&Args
 }
 
 pub(super) const TABLE: &[Builtin] = &[
-    infix("+", Type::Any, "Sum of numbers, element by element; joins two strings; adds covariances.", add)
-        .pull(|a, z, by| of_two(a, z, by, |_, _, _| [1.0, 1.0])),
+    infix("+", Type::Any, "Sum of numbers, element by element; joins two strings; adds covariances.", add).pull(
+        |a, z, by| match z {
+            Value::Object(_) => {
+                CovarianceValue::pull_both(a.get(0), a.get(1), by).map(|both| both.into_iter().collect())
+            }
+            _ => of_two(a, z, by, |_, _, _| [1.0, 1.0]),
+        },
+    ),
     infix("-", Type::Nums, "Difference, element by element.", |a| arithmetic(a, |x, y| x - y))
         .pull(|a, z, by| of_two(a, z, by, |_, _, _| [1.0, -1.0])),
     infix(

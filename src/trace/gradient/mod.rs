@@ -12,6 +12,7 @@ use super::choices::Target;
 use super::demand::Failure;
 use super::graph::Graph;
 use super::node::*;
+use crate::dist::{Datum, Dist};
 use crate::lang::adjoint::Adjoint;
 use crate::lang::code::{Code, DistSpec, Operand};
 use crate::lang::error::FaultKind;
@@ -79,30 +80,50 @@ impl Graph {
         for n in active_scores {
             pass.pull_score(n)?;
         }
-        let mut by_target: FxHashMap<NodeId, Adjoint> = FxHashMap::default();
+        let mut own: FxHashMap<NodeId, Option<Own>> = targets.iter().map(|t| (t.node, None)).collect();
         while let Some(n) = pass.order.pop() {
             let by = pass.adjoints.remove(&n).unwrap_or_default();
             if by.is_unknown() {
                 return Err(pass.no_derivative(n, "what is made of this"));
             }
-            if targets.iter().any(|t| t.node == n) {
+            if let Some(place) = own.get_mut(&n) {
                 pass.pull_support(n, targets, &by)?;
-                by_target.insert(n, by);
+                *place = self.own(code, n, by);
             } else if !by.is_zero() {
                 pass.pull(n, &by)?;
             }
         }
         for t in targets {
-            let by = by_target.get(&t.node).cloned().unwrap_or_default();
-            self.free_gradient(code, *t, &by, out);
+            if let Some(Some(o)) = own.get(&t.node) {
+                o.free_gradient(*t, out);
+            }
         }
         Ok(())
     }
 
-    /// From the derivative by a choice's stored form to that by its unconstrained coordinates.
-    fn free_gradient(&self, code: &Code, t: Target, by: &Adjoint, out: &mut Vec<f64>) {
-        let Some(dist) = self.dist_of(code, t.node) else { return };
-        let one = |dist: &crate::dist::Dist, stored: &crate::dist::Datum, by: &Adjoint, out: &mut Vec<f64>| {
+    fn own(&self, code: &Code, n: NodeId, mut by: Adjoint) -> Option<Own> {
+        let (dist, stored) = (self.dist_of(code, n)?, self.stored(n)?);
+        if dist.is_stored_whitened() {
+            // The value moves with the noise, which has a density of its own.
+            let mut g = dist.realise_pull(&by.numbers(stored.len()?))?;
+            g.iter_mut().zip(dist.gradient_stored(&stored)?.x).for_each(|(g, own)| *g += own);
+            by = Adjoint::Array(g);
+        }
+        Some(Own { dist, stored, by })
+    }
+}
+
+/// A choice and the derivative by its stored form.
+struct Own {
+    dist: Dist,
+    stored: Datum,
+    by: Adjoint,
+}
+
+impl Own {
+    /// Appends the derivatives by the unconstrained coordinates of a target.
+    fn free_gradient(&self, t: Target, out: &mut Vec<f64>) {
+        let of = |dist: &Dist, stored: &Datum, by: &Adjoint, out: &mut Vec<f64>| {
             let support = dist.stored_support();
             let mut y = Vec::with_capacity(support.free_dim());
             support.to_free(stored, &mut y);
@@ -110,31 +131,15 @@ impl Graph {
             flatten(by, support.gradient_dim(), &mut by_x);
             support.free_gradient(&y, &by_x, out);
         };
-        let Some(stored) = self.stored(t.node) else { return };
-        if dist.is_stored_whitened() {
-            // The value moves with the noise, which has a density of its own.
-            let size = stored.len().unwrap_or(0);
-            let (Some(mut g), Some(own)) = (dist.realise_pull(&by.numbers(size)), dist.gradient_stored(&stored)) else {
-                return out.resize(out.len() + size, 0.0);
-            };
-            g.iter_mut().zip(own.x).for_each(|(g, own)| *g += own);
-            return one(&dist, &stored, &Adjoint::Array(g), out);
-        }
-        match dist.elements() {
-            None => one(&dist, &stored, by, out),
-            Some(_) if t.element != NONE => {
-                let i = t.element as usize;
-                if let Some(x) = stored.element(i) {
-                    one(&dist.element(i), &x, &by.element(i), out);
-                }
+        let element = |i: usize, out: &mut Vec<f64>| {
+            if let Some(x) = self.stored.element(i) {
+                of(&self.dist.element(i), &x, &self.by.element(i), out);
             }
-            Some(n) => {
-                for i in 0..n {
-                    if let Some(x) = stored.element(i) {
-                        one(&dist.element(i), &x, &by.element(i), out);
-                    }
-                }
-            }
+        };
+        match self.dist.elements() {
+            None => of(&self.dist, &self.stored, &self.by, out),
+            Some(_) if t.element != NONE => element(t.element as usize, out),
+            Some(n) => (0..n).for_each(|i| element(i, out)),
         }
     }
 }

@@ -260,7 +260,11 @@ impl Reverse<'_> {
         let Some(d) = self.graph.dist_of(self.code, n) else { return Ok(()) };
         let Some(size) = self.graph.stored(n).and_then(|z| z.len()) else { return Ok(()) };
         // value = mean + L z
-        self.give_params(n, dist, &d, by.numbers(size))
+        let by = by.numbers(size);
+        if let Some(z) = self.graph.stored(n) {
+            self.give_matrix(n, dist, &d, &z, &by, 1.0)?;
+        }
+        self.give_params(n, dist, &d, by)
     }
 
     /// The part of a target's adjoint that goes to what moves its support or its realisation; changes nothing in its own.

@@ -3,7 +3,7 @@
 use super::{Inputs, Reverse};
 use crate::dist::{Datum, Dist};
 use crate::lang::adjoint::Adjoint;
-use crate::lang::builtins::Args;
+use crate::lang::builtins::{Args, CovarianceValue};
 use crate::lang::code::{DistSpec, Op};
 use crate::lang::value::Value;
 use crate::trace::demand::Failure;
@@ -50,6 +50,7 @@ impl Reverse<'_> {
                     self.give_node(n, by_x);
                 }
                 self.give_params(n, spec, &dist, params)?;
+                self.give_matrix(n, spec, &dist, &stored, &[], 1.0)?;
             }
             Op::Observe { dist: spec, value, .. } => {
                 let mut deps = Deps::new();
@@ -72,6 +73,10 @@ impl Reverse<'_> {
                 params.iter_mut().for_each(|p| *p *= self.power);
                 self.give(frame, *value, by_x);
                 self.give_params(n, spec, &dist, params)?;
+                if let Some(x) = observed.to_datum() {
+                    // What is observed is the value, however a choice would be stored.
+                    self.give_matrix(n, spec, &dist.centred(), &x, &[], self.power)?;
+                }
             }
             _ => {}
         }
@@ -94,10 +99,69 @@ impl Reverse<'_> {
                 let mut deps = Deps::new();
                 let values: SmallVec<[&Value; 8]> =
                     args.iter().map(|a| g.plain(self.code, frame, *a, &mut deps)).collect();
-                let pulled = by_arguments(&Args { builtin, values: &values }, dist, &params);
+                let mut pulled = by_arguments(&Args { builtin, values: &values }, dist, &params);
+                pulled
+                    .iter_mut()
+                    .enumerate()
+                    .filter(|(i, _)| is_matrix(dist, *i))
+                    .for_each(|(_, p)| *p = Adjoint::Zero);
                 self.give_arguments(n, frame, builtin, args, pulled)?;
             }
         }
+        Ok(())
+    }
+}
+
+/// What [`Reverse::give_matrix`] is about: the argument with a covariance.
+enum Matrix {
+    Kernel,
+    Covariance,
+    Factor,
+}
+
+impl Reverse<'_> {
+    /// Hands the derivatives by a covariance, `weight` times, to what it was computed from; [`by_arguments`] leaves it out.
+    pub(super) fn give_matrix(
+        &mut self,
+        n: NodeId,
+        spec: &DistSpec,
+        dist: &Dist,
+        stored: &Datum,
+        by_value: &[f64],
+        weight: f64,
+    ) -> Result<(), Failure> {
+        let DistSpec::Family { builtin, args } = spec else { return Ok(()) };
+        let (g, frame) = (self.graph, self.graph.nodes[n as usize].frame);
+        let mut deps = Deps::new();
+        let values: SmallVec<[&Value; 8]> = args.iter().map(|a| g.plain(self.code, frame, *a, &mut deps)).collect();
+        let (i, which) = match (dist, values.get(1)) {
+            (Dist::Gp(_), _) => (1, Matrix::Kernel),
+            (Dist::MvNormal(_), Some(Value::Unit)) => (2, Matrix::Factor),
+            (Dist::MvNormal(_), _) => (1, Matrix::Covariance),
+            _ => return Ok(()),
+        };
+        let Some(source) = args.get(i).and_then(|o| self.source(frame, *o)).filter(|s| self.is_active(*s)) else {
+            return Ok(());
+        };
+        let a = Args { builtin: self.code.builtins.get(*builtin), values: &values };
+        let found = match (dist, which) {
+            (Dist::Gp(d), _) => {
+                let cov = values.get(1).and_then(|v| v.downcast::<CovarianceValue>());
+                let at = a.array(2).ok();
+                let by = cov.zip(at).and_then(|(c, at)| d.covariance_gradient(&c.0, &at, stored, by_value));
+                by.map(Adjoint::Array)
+            }
+            (Dist::MvNormal(d), which) => {
+                let rows = d.matrix_gradient(matches!(which, Matrix::Factor), stored, by_value);
+                rows.map(|rows| Adjoint::List(rows.into_iter().map(Adjoint::Array).collect()))
+            }
+            _ => None,
+        };
+        let Some(mut by) = found else {
+            return Err(self.no_derivative(n, &format!("the covariance of `{}`", dist.name())));
+        };
+        scale(&mut by, weight);
+        self.give_node(source, by);
         Ok(())
     }
 }
@@ -189,6 +253,7 @@ pub(super) fn by_arguments(a: &Args, dist: &Dist, params: &[f64]) -> SmallVec<[A
     };
     let one = |i: usize| -> Adjoint {
         match a.get(i) {
+            _ if is_matrix(dist, i) => Adjoint::Unknown,
             Value::Num(_) if dist.name() == "gp" => {
                 Adjoint::Num(take(params.len()).map_or(0.0, |all| all.iter().sum()))
             }
@@ -207,4 +272,9 @@ pub(super) fn by_arguments(a: &Args, dist: &Dist, params: &[f64]) -> SmallVec<[A
         }
     };
     (0..count).map(one).collect()
+}
+
+/// Whether an argument is a covariance, whose derivatives come by another way: [`Reverse::give_matrix`].
+fn is_matrix(dist: &Dist, i: usize) -> bool {
+    matches!((dist, i), (Dist::Gp(_), 1) | (Dist::MvNormal(_), 1 | 2))
 }

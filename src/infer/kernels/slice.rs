@@ -1,0 +1,130 @@
+//! `slice(sel, width)`: slice sampling of one number at a time, with stepping out and shrinkage (Neal 2003, section 4).
+//!
+//! Each coordinate of the unconstrained space is moved in turn. A place where the program has no value, or where choices appear or
+//! vanish, counts as outside the slice, so the kernel moves within the present structure.
+
+use crate::infer::kernel::{At, Kernel, Outcome, Registered, Scope, recoverable};
+use crate::rng::Stream;
+use crate::trace::{Change, Target, Trace, TraceResult};
+use rustc_hash::FxHashMap;
+
+/// At most so many widths are stepped out, shared at random between both sides, which keeps the kernel reversible.
+const STEPS_OUT: u32 = 32;
+
+/// An interval that has shrunk so often holds nothing but the present point.
+const SHRINKS: u32 = 200;
+
+/// Univariate slice sampling.
+#[derive(Clone, Debug)]
+pub struct Slice {
+    scope: Registered,
+    width: Option<f64>,
+    /// By address and coordinate: widths learnt in warm-up, with the number of moves they are from.
+    learnt: FxHashMap<(u64, usize), (f64, f64)>,
+}
+
+impl Slice {
+    /// The kernel for these choices, with a width in the unconstrained space, or else widths that are learnt.
+    pub fn new(scope: Scope, width: Option<f64>) -> Self {
+        Slice { scope: Registered::new(scope), width, learnt: FxHashMap::default() }
+    }
+
+    fn width(&self, key: (u64, usize)) -> f64 {
+        self.width.unwrap_or_else(|| self.learnt.get(&key).map_or(1.0, |(w, _)| *w))
+    }
+
+    /// Towards the mean length of the slices found.
+    fn learn(&mut self, key: (u64, usize), length: f64) {
+        let (width, count) = self.learnt.entry(key).or_insert((1.0, 0.0));
+        *count += 1.0;
+        *width += (length.clamp(1e-6, 1e6) - *width) / count.min(50.0);
+    }
+}
+
+/// One coordinate of a choice.
+struct Line<'a> {
+    trace: &'a mut Trace,
+    at: &'a At,
+    target: Target,
+    y: Vec<f64>,
+    coordinate: usize,
+    /// The log Jacobian at the present point.
+    jacobian: f64,
+}
+
+impl Line<'_> {
+    /// The log density at a place, less that of the present point; the place is then pending.
+    fn log_density(&mut self, x: f64) -> TraceResult<f64> {
+        let mut y = self.y.clone();
+        y[self.coordinate] = x;
+        let proposed = self.trace.propose(&[(self.target, Change::Free(y))], self.at.draws(0));
+        Ok(match recoverable(proposed)? {
+            Some(w) if w.appeared + w.vanished == 0 => self.at.tempered(&w) + w.log_jacobian - self.jacobian,
+            _ => f64::NEG_INFINITY,
+        })
+    }
+
+    /// Moves along the line; gives the length of the interval that was stepped out.
+    fn step(&mut self, width: f64, rng: &mut Stream) -> TraceResult<f64> {
+        let here = self.y[self.coordinate];
+        let level = libm::log(rng.open_uniform());
+        let mut left = here - width * rng.uniform();
+        let mut right = left + width;
+        let mut to_left = rng.index(STEPS_OUT as usize);
+        let mut to_right = STEPS_OUT as usize - 1 - to_left;
+        while to_left > 0 && self.log_density(left)? > level {
+            left -= width;
+            to_left -= 1;
+        }
+        while to_right > 0 && self.log_density(right)? > level {
+            right += width;
+            to_right -= 1;
+        }
+        let length = right - left;
+        for _ in 0..SHRINKS {
+            let x = left + (right - left) * rng.uniform();
+            if self.log_density(x)? > level {
+                self.trace.commit();
+                return Ok(length);
+            }
+            if x < here { left = x } else { right = x }
+        }
+        self.trace.rollback();
+        Ok(length)
+    }
+}
+
+impl Kernel for Slice {
+    fn name(&self) -> String {
+        "slice".into()
+    }
+
+    fn step(&mut self, trace: &mut Trace, at: &At) -> TraceResult<Outcome> {
+        let mut rng = at.stream();
+        let (targets, _) = self.scope.members(trace, &mut rng);
+        let mut outcome = Outcome::default();
+        for target in targets {
+            let mut coordinate = 0;
+            // Read anew for each coordinate: the one before has moved.
+            while let (Some(dist), Some(stored)) = (trace.dist(target), trace.stored(target)) {
+                let support = dist.stored_support();
+                if support.is_discrete() || coordinate >= support.free_dim() {
+                    break;
+                }
+                let mut y = Vec::with_capacity(support.free_dim());
+                support.to_free(&stored, &mut y);
+                let jacobian = support.from_free(&y).1;
+                let key = (trace.address_hash(target), coordinate);
+                let width = self.width(key);
+                let length = Line { trace, at, target, y, coordinate, jacobian }.step(width, &mut rng)?;
+                if at.adapting && self.width.is_none() {
+                    self.learn(key, length);
+                }
+                outcome.proposals += 1;
+                outcome.accepted += 1;
+                coordinate += 1;
+            }
+        }
+        Ok(outcome)
+    }
+}
