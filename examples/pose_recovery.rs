@@ -3,74 +3,33 @@
 //!
 //! `cargo run --release --example pose_recovery -- [CASES] [SECONDS] [PARAMETER=VALUE…]`
 
+mod known_truth;
+
+use known_truth::{SIZE, argument, compile, draw, global, quantile, score, sorted};
 use pcadlang::infer::Watch;
-use pcadlang::lang::builtins::scene::{ImageValue, ViewValue};
-use pcadlang::lang::load::embedded;
-use pcadlang::lang::value::Value;
-use pcadlang::render::Camera;
-use pcadlang::rng::{Purpose, StreamKey};
+use pcadlang::lang::builtins::scene::ViewValue;
 use pcadlang::trace::{Draws, Trace};
 use pcadlang::vision::ContourMap;
-use pcadlang::{Model, Program, RunOptions};
+use pcadlang::{Model, RunOptions};
 use std::collections::BTreeMap;
 use std::sync::{Arc, Mutex};
 use std::time::Duration;
 
-const SIZE: u32 = 256;
 const LIMBS: [&str; 6] = ["shoulder", "elbow", "wrist", "hip", "knee", "ankle"];
 
 /// By joint: x and y in pixels, and z, towards the camera, in scene units.
 type Joints = BTreeMap<Arc<str>, [f64; 3]>;
 
-fn compile(map: ContourMap) -> Result<Model, pcadlang::Error> {
-    let image = Value::object(ImageValue::contours(map, None));
-    let program = Program::parse(embedded("human.pcad").unwrap_or_default())?
-        .observe("photo", image)
-        .camera(Camera::default_for(SIZE, SIZE))
-        .set("clean", "true")
-        .set("sigma", "0.1")
-        .set("truncate", "20");
-    let settings: Vec<String> = std::env::args().skip(3).collect();
-    let set = |p: Program, s: &String| match s.split_once('=') {
-        Some((name, value)) => p.set(name, value),
-        None => p,
-    };
-    settings.iter().fold(program, set).compile()
+fn over(map: ContourMap) -> Result<Model, pcadlang::Error> {
+    compile("human.pcad", &[("sigma", "0.1"), ("truncate", "20")], map)
 }
 
-fn view<T>(trace: &mut Trace, read: impl FnOnce(&ViewValue) -> T) -> Option<T> {
-    let draws = Draws { key: StreamKey::new(0, 0, Purpose::PREDICT), step: 0, lane: 0 };
-    let value = trace.global("view", draws).and_then(Result::ok)?;
-    value.downcast::<ViewValue>().map(read)
-}
-
-fn joints(view: &ViewValue) -> Joints {
+fn joints(trace: &mut Trace) -> Joints {
+    let value = global(trace, "view");
+    let Some(view) = value.downcast::<ViewValue>() else { return Joints::new() };
     let depth = view.0.solid().landmarks().iter().map(|l| l.position.z);
     let all = view.landmarks(SIZE, SIZE).zip(depth);
     all.filter_map(|((name, at), z)| at.map(|[x, y]| (Arc::clone(name), [x, y, z]))).collect()
-}
-
-/// A person from the prior who is wholly in the picture: the joints, the trace and the contours.
-fn person(seed: u64) -> Result<(Joints, Trace, ContourMap), pcadlang::Error> {
-    let blank = compile(ContourMap::new(SIZE, SIZE))?;
-    for attempt in 0.. {
-        let mut trace = blank.simulate(seed, attempt)?;
-        let Some((joints, c)) = view(&mut trace, |v| (joints(v), v.0.contours(SIZE))) else { continue };
-        let inside = |v: &[f32]| v.iter().all(|x| (4.0..SIZE as f32 - 4.0).contains(x));
-        if c.length.iter().sum::<f32>() < 100.0 || !inside(&c.x) || !inside(&c.y) {
-            continue;
-        }
-        let map = ContourMap {
-            x: c.x.clone(),
-            y: c.y.clone(),
-            tx: c.tx.clone(),
-            ty: c.ty.clone(),
-            strength: vec![1.0; c.x.len()],
-            ..ContourMap::new(SIZE, SIZE)
-        };
-        return Ok((joints, trace, map));
-    }
-    unreachable!("attempts do not end")
 }
 
 /// The joints of all draws.
@@ -79,7 +38,8 @@ struct Seen(Mutex<Vec<Joints>>);
 
 impl Watch for Seen {
     fn draw(&self, _chain: u32, trace: &mut Trace, _draws: Draws) {
-        if let (Some(joints), Ok(mut all)) = (view(trace, joints), self.0.lock()) {
+        let joints = joints(trace);
+        if let Ok(mut all) = self.0.lock() {
             all.push(joints);
         }
     }
@@ -108,22 +68,13 @@ fn apart(a: &[f64; 3], b: &[f64; 3]) -> f64 {
     (a[0] - b[0]).hypot(a[1] - b[1])
 }
 
-fn sorted(mut v: Vec<f64>) -> Vec<f64> {
-    v.sort_by(f64::total_cmp);
-    v
-}
-
-fn quantile(sorted: &[f64], q: f64) -> f64 {
-    sorted.get((q * sorted.len() as f64) as usize).copied().unwrap_or(f64::NAN)
-}
-
 fn mean(v: &[f64]) -> f64 {
     v.iter().sum::<f64>() / v.len() as f64
 }
 
 fn main() -> Result<(), pcadlang::Error> {
-    let argument = |i: usize, default: u64| std::env::args().nth(i).and_then(|a| a.parse().ok()).unwrap_or(default);
     let (cases, seconds) = (argument(1, 20), argument(2, 30));
+    let blank = over(ContourMap::new(SIZE, SIZE))?;
     println!(
         "Errors of medians in the picture, in percent of the torso; with left and right as they fit better; and of depth"
     );
@@ -135,12 +86,10 @@ fn main() -> Result<(), pcadlang::Error> {
     let mut all_errors: Vec<Vec<f64>> = vec![Vec::new(); LIMBS.len()];
     let (mut held, mut asked, mut depths, mut all_exchanged) = (0, 0, Vec::new(), Vec::new());
     for case in 0..cases {
-        let (truth, t, map) = person(case)?;
-        let model = compile(map)?;
-        // The score of the truth under the same observation.
-        let draws = Draws { key: StreamKey::new(0, 0, Purpose::PREDICT), step: 0, lane: 0 };
-        let rebuilt = Trace::generate(Arc::clone(model.code()), t.constraints(), draws, Default::default());
-        let score = rebuilt.map_or(f64::NAN, |(t, _)| t.log_joint());
+        let (mut t, map) = draw(&blank, case)?;
+        let truth = joints(&mut t);
+        let model = over(map)?;
+        let score = score(&model, &t);
         let seen = Arc::new(Seen::default());
         let options = RunOptions {
             seed: case + 1,

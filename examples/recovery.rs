@@ -3,67 +3,21 @@
 //!
 //! `cargo run --release --example recovery -- [CASES] [SECONDS] [PARAMETER=VALUE…]`
 
-use pcadlang::lang::builtins::scene::{ImageValue, ViewValue};
-use pcadlang::lang::load::embedded;
-use pcadlang::lang::value::Value;
-use pcadlang::render::Camera;
-use pcadlang::report::Quantity;
-use pcadlang::rng::{Purpose, StreamKey};
-use pcadlang::trace::{Draws, Trace};
-use pcadlang::vision::ContourMap;
-use pcadlang::{Model, Program, RunOptions};
-use std::sync::Arc;
-use std::time::Duration;
+mod known_truth;
 
-const SIZE: u32 = 256;
+use known_truth::{argument, compile, draw, global, quantile, score, sorted};
+use pcadlang::lang::value::Value;
+use pcadlang::report::Quantity;
+use pcadlang::trace::Trace;
+use pcadlang::vision::ContourMap;
+use pcadlang::{Model, RunOptions};
+use std::time::Duration;
 
 /// Where the default camera stands on the z axis.
 const EYE: f64 = 8.0;
 
-fn compile(map: ContourMap) -> Result<Model, pcadlang::Error> {
-    let image = Value::object(ImageValue::contours(map, None));
-    let program = Program::parse(embedded("lathe.pcad").unwrap_or_default())?
-        .observe("photo", image)
-        .camera(Camera::default_for(SIZE, SIZE))
-        .set("clean", "true")
-        .set("sigma", "0.1");
-    let settings: Vec<String> = std::env::args().skip(3).collect();
-    let set = |p: Program, s: &String| match s.split_once('=') {
-        Some((name, value)) => p.set(name, value),
-        None => p,
-    };
-    settings.iter().fold(program, set).compile()
-}
-
-/// A scene from the prior that lies within the picture: its trace and contours.
-fn scene(seed: u64) -> Result<(Trace, ContourMap), pcadlang::Error> {
-    let blank = compile(ContourMap::new(SIZE, SIZE))?;
-    for attempt in 0.. {
-        let mut trace = blank.simulate(seed, attempt)?;
-        let view = global(&mut trace, "view");
-        let Some(view) = view.downcast::<ViewValue>() else { continue };
-        let c = view.0.contours(SIZE);
-        let inside = |v: &[f32]| v.iter().all(|x| (4.0..SIZE as f32 - 4.0).contains(x));
-        if c.length.iter().sum::<f32>() < 100.0 || !inside(&c.x) || !inside(&c.y) {
-            continue;
-        }
-        let strength = vec![1.0; c.x.len()];
-        let map = ContourMap {
-            x: c.x.clone(),
-            y: c.y.clone(),
-            tx: c.tx.clone(),
-            ty: c.ty.clone(),
-            strength,
-            ..ContourMap::new(SIZE, SIZE)
-        };
-        return Ok((trace, map));
-    }
-    unreachable!("attempts do not end")
-}
-
-fn global(trace: &mut Trace, name: &str) -> Value {
-    let draws = Draws { key: StreamKey::new(0, 0, Purpose::PREDICT), step: 0, lane: 0 };
-    trace.global(name, draws).and_then(Result::ok).unwrap_or_default()
+fn over(map: ContourMap) -> Result<Model, pcadlang::Error> {
+    compile("lathe.pcad", &[("sigma", "0.1")], map)
 }
 
 /// A number of the truth by the name of its column.
@@ -110,19 +64,15 @@ fn rms(a: &[f64], b: &[f64]) -> f64 {
 }
 
 fn main() -> Result<(), pcadlang::Error> {
-    let argument = |i: usize, default: u64| std::env::args().nth(i).and_then(|a| a.parse().ok()).unwrap_or(default);
     let (cases, seconds) = (argument(1, 20), argument(2, 20));
     println!("case    size       H  x and y       z   tilt    shape  held by 90 %  R-hat  log joint, best (truth)");
+    let blank = over(ContourMap::new(known_truth::SIZE, known_truth::SIZE))?;
     let (mut held, mut asked) = (0, 0);
     let mut errors: Vec<[f64; 6]> = Vec::new();
     for case in 0..cases {
-        let (mut t, map) = scene(case)?;
-        let model = compile(map)?;
-        // The score of the truth under the same observation.
-        let constraints = t.constraints();
-        let draws = Draws { key: StreamKey::new(0, 0, Purpose::PREDICT), step: 0, lane: 0 };
-        let rebuilt = Trace::generate(Arc::clone(model.code()), constraints, draws, Default::default());
-        let score = rebuilt.map_or(f64::NAN, |(t, _)| t.log_joint());
+        let (mut t, map) = draw(&blank, case)?;
+        let model = over(map)?;
+        let score = score(&model, &t);
         let options = RunOptions { seed: case + 1, time: Some(Duration::from_secs(seconds)), ..RunOptions::default() };
         let posterior = model.run(&options, 4, 2)?;
         let quantities = posterior.quantities();
@@ -167,13 +117,9 @@ fn main() -> Result<(), pcadlang::Error> {
         );
         errors.push(e);
     }
-    let quantile = |i: usize, q: f64| {
-        let mut v: Vec<f64> = errors.iter().map(|e| e[i]).collect();
-        v.sort_by(f64::total_cmp);
-        v.get((q * v.len() as f64) as usize).copied().unwrap_or(f64::NAN)
-    };
+    let at = |i: usize, q: f64| quantile(&sorted(errors.iter().map(|e| e[i]).collect()), q);
     for (name, q) in [("half", 0.5), ("3/4 ", 0.75)] {
-        let e: Vec<f64> = (0..6).map(|i| quantile(i, q)).collect();
+        let e: Vec<f64> = (0..6).map(|i| at(i, q)).collect();
         println!(
             "{name}  {:5.1} %  {:4.1} %    {:5.3}   {:5.3}  {:4.1}°  {:6.4}",
             100.0 * e[0],

@@ -13,3 +13,11 @@ pub use special::{
     log_normal_cdf, log_sum_exp, log1p_exp, logit, normal_cdf,
 };
 pub use tails::{bessel_deficit, log_scaled_i0, mills_ratio};
+
+/// Adds numbers to those of a list, which becomes as long as they are.
+pub(crate) fn accumulate(all: &mut Vec<f64>, more: &[f64]) {
+    if all.len() < more.len() {
+        all.resize(more.len(), 0.0);
+    }
+    all.iter_mut().zip(more).for_each(|(a, b)| *a += b);
+}

@@ -31,14 +31,13 @@ impl Joints {
     }
 
     /// The width and height of the picture that positions are in.
-    fn pixels(&self, view: &ViewValue) -> (f64, f64) {
-        let (width, height) = self.size.unwrap_or((view.0.camera().width, view.0.camera().height));
-        (f64::from(width), f64::from(height))
+    fn pixels(&self, view: &ViewValue) -> (u32, u32) {
+        self.size.unwrap_or((view.0.camera().width, view.0.camera().height))
     }
 
     fn positions(&self, view: &ViewValue) -> Vec<(Arc<str>, Option<[f64; 2]>)> {
         let (width, height) = self.pixels(view);
-        view.landmarks(width as u32, height as u32).map(|(name, at)| (Arc::clone(name), at)).collect()
+        view.landmarks(width, height).map(|(name, at)| (Arc::clone(name), at)).collect()
     }
 
     /// The file: means and spreads over all draws of all chains, and the best draw, that of `view`. None if it has no
@@ -75,6 +74,7 @@ impl Watch for Joints {
         let Some(view) = values.first().and_then(|v| v.downcast::<ViewValue>()) else { return };
         let found = trace.located();
         let (width, height) = self.pixels(view);
+        let (width, height) = (f64::from(width), f64::from(height));
         for (name, at) in self.positions(view) {
             match (found.iter().find(|l| l.name == name), at) {
                 (Some(l), _) => {

@@ -1,6 +1,7 @@
 //! Independent elements of one distribution.
 
 use super::{Datum, Dist, Distribution, Gradient, ParamError, Support, product};
+use crate::num::accumulate;
 use crate::rng::Stream;
 
 /// `iid(d, n)`. In the language its elements are choices with addresses of their own.
@@ -59,10 +60,7 @@ impl Distribution for Iid {
     }
 
     fn gradient(&self, x: &Datum) -> Option<Gradient> {
-        product::slopes(self.parts(), self.n, x, |all, one| {
-            all.resize(one.len(), 0.0);
-            all.iter_mut().zip(one).for_each(|(a, b)| *a += b);
-        })
+        product::slopes(self.parts(), self.n, x, |all, one| accumulate(all, &one))
     }
 
     fn is_gaussian(&self) -> bool {

@@ -66,18 +66,17 @@ impl MvNormal {
     /// The derivatives by the entries of the covariance (both triangles) or, with `chol`, of its factor, as rows: of the log density
     /// of a stored value; of one stored as noise, of what has these derivatives by the value.
     pub fn matrix_gradient(&self, chol: bool, stored: &super::Datum, by_value: &[f64]) -> Option<Vec<Vec<f64>>> {
-        let by = self.0.factor_gradient(stored, by_value)?;
-        let n = self.0.size();
-        let entry = |m: &[f64], i: usize, j: usize| m[i * (i + 1) / 2 + j];
-        if chol {
-            let cell = |i: usize, j: usize| if j <= i { entry(&by, i, j) } else { 0.0 };
-            return Some((0..n).map(|i| (0..n).map(|j| cell(i, j)).collect()).collect());
+        let mut by = self.0.factor_gradient(stored, by_value)?;
+        if !chol {
+            by = self.0.factor.pull_cholesky(&by);
         }
-        let by = self.0.factor.pull_cholesky(&by);
-        let cell = |i: usize, j: usize| match i == j {
-            true => entry(&by, i, i),
-            false => 0.5 * entry(&by, i.max(j), i.min(j)),
+        // An entry off the diagonal of a covariance stands for two places.
+        let cell = |i: usize, j: usize| match (i.max(j), i.min(j)) {
+            (row, column) if i == j => by[row * (row + 1) / 2 + column],
+            _ if chol && j > i => 0.0,
+            (row, column) => by[row * (row + 1) / 2 + column] * if chol { 1.0 } else { 0.5 },
         };
+        let n = self.0.size();
         Some((0..n).map(|i| (0..n).map(|j| cell(i, j)).collect()).collect())
     }
 

@@ -2,7 +2,7 @@
 
 use super::support::is_ascending;
 use super::{Datum, Dist, Distribution, Gradient, ParamError, Support, product};
-use crate::num::ln_gamma;
+use crate::num::{accumulate, ln_gamma};
 use crate::rng::Stream;
 
 /// `ordered(d, n)`: n independent numbers of `d` in ascending order, one choice. The density is n! times the product of those of
@@ -62,9 +62,6 @@ impl Distribution for Ordered {
         if !self.log_density(x).is_finite() {
             return None;
         }
-        product::slopes(self.parts(), self.n, x, |all, one| {
-            all.resize(one.len(), 0.0);
-            all.iter_mut().zip(one).for_each(|(a, b)| *a += b);
-        })
+        product::slopes(self.parts(), self.n, x, |all, one| accumulate(all, &one))
     }
 }

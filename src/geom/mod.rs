@@ -30,3 +30,8 @@ pub use lathe::{Caps, Profile, lathe};
 pub use mesh::{Edge, Mesh, NO_FACE, Topology};
 pub use solid::{Instance, Solid};
 pub use sphere::sphere;
+
+/// The matrix a b'.
+pub(crate) fn outer(a: glam::DVec3, b: glam::DVec3) -> glam::DMat3 {
+    glam::DMat3::from_cols(a * b.x, a * b.y, a * b.z)
+}

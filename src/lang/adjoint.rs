@@ -2,6 +2,7 @@
 //! when a gradient is taken (reverse mode).
 
 use super::value::Value;
+use crate::num::accumulate;
 use std::sync::Arc;
 
 /// The derivatives of a number by a value.
@@ -77,12 +78,7 @@ impl Adjoint {
             (_, Adjoint::Zero) | (Adjoint::Unknown, _) => {}
             (Adjoint::Zero, other) => *self = other,
             (Adjoint::Num(a), Adjoint::Num(b)) => *a += b,
-            (Adjoint::Array(a), Adjoint::Array(b)) => {
-                if a.len() < b.len() {
-                    a.resize(b.len(), 0.0);
-                }
-                a.iter_mut().zip(b).for_each(|(a, b)| *a += b);
-            }
+            (Adjoint::Array(a), Adjoint::Array(b)) => accumulate(a, &b),
             (Adjoint::Record(_), Adjoint::Record(fields)) => {
                 fields.into_iter().for_each(|(name, by)| self.add_field(&name, by));
             }

@@ -27,7 +27,7 @@ pub use select::{ChoiceKind, Pattern, PatternSegment, Selector};
 use crate::dist::{Datum, Dist};
 use crate::lang::code::{Code, DistSpec, Op, Operand};
 use crate::lang::error::RunError;
-use crate::lang::value::{Located, Value};
+use crate::lang::value::{Likelihood, Located, Value};
 use graph::Graph;
 use journal::Before;
 use node::{NONE, State};
@@ -229,11 +229,7 @@ impl Trace {
     pub fn gradient(&self, targets: &[Target], power: f64, out: &mut Vec<f64>) -> TraceResult<()> {
         let mut scored: Vec<u32> = self.graph.choices.selections[0].targets().iter().map(|t| t.node).collect();
         scored.dedup();
-        let effects =
-            self.graph.nodes.iter().enumerate().filter(|(_, n)| n.state == State::Clean).map(|(i, _)| i as u32);
-        scored.extend(
-            effects.filter(|n| matches!(self.graph.op(&self.code, *n), Op::Observe { .. } | Op::Factor { .. })),
-        );
+        scored.extend(self.scored_nodes());
         self.graph.gradient(&self.code, targets, &scored, power, out)
     }
 
@@ -288,6 +284,19 @@ impl Trace {
     /// The value of a choice in stored form.
     pub fn stored(&self, t: Target) -> Option<Datum> {
         if t.element == NONE { self.graph.stored(t.node) } else { self.value(t).to_datum() }
+    }
+
+    /// Where a continuous choice is in the unconstrained space, and the log Jacobian of the transform there: what a
+    /// [`Change::Free`] starts from. `None` for a discrete one.
+    pub fn free(&self, t: Target) -> Option<(Vec<f64>, f64)> {
+        let (support, stored) = (self.dist(t)?.stored_support(), self.stored(t)?);
+        if support.is_discrete() {
+            return None;
+        }
+        let mut y = Vec::with_capacity(support.free_dim());
+        support.to_free(&stored, &mut y);
+        let jacobian = support.from_free(&y).1;
+        Some((y, jacobian))
     }
 
     /// The distribution a choice now has.
@@ -354,15 +363,7 @@ impl Trace {
 
     /// Named points of the scene as the observations put them (see [`crate::lang::value::Likelihood::located`]).
     pub fn located(&self) -> Vec<Located> {
-        let mut all = Vec::new();
-        for (n, _) in self.scored() {
-            let Op::Observe { dist: DistSpec::Value(o), value, .. } = self.graph.op(&self.code, n) else { continue };
-            let frame = self.graph.nodes[n as usize].frame;
-            if let Value::Likelihood(l) = self.graph.value(&self.code, frame, *o) {
-                all.extend(l.located(self.graph.plain(&self.code, frame, *value, &mut node::Deps::new())));
-            }
-        }
-        all
+        self.likelihoods().flat_map(|(l, observed)| l.located(observed)).collect()
     }
 
     /// Every observation and factor with its log density, in the order of the program's blocks.
@@ -389,26 +390,34 @@ impl Trace {
 
     /// Whether an observation's likelihood is no density over its data, so that its scale is a matter of choice.
     pub fn is_pseudo(&self) -> bool {
-        let improper = |n: u32| {
-            let Op::Observe { dist: DistSpec::Value(o), .. } = self.graph.op(&self.code, n) else { return false };
-            let frame = self.graph.nodes[n as usize].frame;
-            matches!(self.graph.value(&self.code, frame, *o), Value::Likelihood(l) if !l.is_proper())
-        };
-        self.scored().into_iter().any(|(n, _)| improper(n))
+        self.likelihoods().any(|(l, _)| !l.is_proper())
+    }
+
+    /// The observations and factors.
+    fn scored_nodes(&self) -> impl Iterator<Item = u32> {
+        let nodes = self.graph.nodes.iter().zip(0..).filter(|(n, _)| n.state == State::Clean).map(|(_, i)| i);
+        nodes.filter(|n| matches!(self.graph.op(&self.code, *n), Op::Observe { .. } | Op::Factor { .. }))
     }
 
     fn scored(&self) -> Vec<(u32, f64)> {
-        let nodes = self.graph.nodes.iter().enumerate().filter(|(_, n)| n.state == State::Clean);
-        nodes
-            .filter(|(i, _)| matches!(self.graph.op(&self.code, *i as u32), Op::Observe { .. } | Op::Factor { .. }))
-            .map(|(i, n)| {
-                let score = match n.side.as_deref() {
-                    Some(node::Side::Total(t)) if n.score == 0.0 => t.sum.value(),
-                    _ => n.score,
-                };
-                (i as u32, score)
-            })
-            .collect()
+        let score = |i: u32| {
+            let n = &self.graph.nodes[i as usize];
+            match n.side.as_deref() {
+                Some(node::Side::Total(t)) if n.score == 0.0 => t.sum.value(),
+                _ => n.score,
+            }
+        };
+        self.scored_nodes().map(|n| (n, score(n))).collect()
+    }
+
+    /// The likelihoods that are not distributions, and what is observed under each.
+    fn likelihoods(&self) -> impl Iterator<Item = (&dyn Likelihood, &Value)> {
+        self.scored_nodes().filter_map(|n| {
+            let Op::Observe { dist: DistSpec::Value(o), value, .. } = self.graph.op(&self.code, n) else { return None };
+            let frame = self.graph.nodes[n as usize].frame;
+            let Value::Likelihood(l) = self.graph.value(&self.code, frame, *o) else { return None };
+            Some((&**l, self.graph.plain(&self.code, frame, *value, &mut node::Deps::new())))
+        })
     }
 
     /// Every active choice with its address and log density, by address.

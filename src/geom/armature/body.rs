@@ -8,7 +8,7 @@
 use super::morph::{Anchor, Morph};
 use super::recent;
 use super::{JointPose, Rig, Rules};
-use crate::geom::{GeomError, Landmark, Mesh, Solid, Topology, edges};
+use crate::geom::{GeomError, Landmark, Mesh, Solid, Topology, edges, outer};
 use glam::{Affine3A, DAffine3, DVec3, Mat3A, Vec3, Vec3A};
 use std::sync::{Arc, LazyLock};
 
@@ -22,6 +22,19 @@ pub struct Influence {
     pub joints: [u16; MOST_WEIGHTS],
     /// Their weights.
     pub weights: [f32; MOST_WEIGHTS],
+}
+
+impl Influence {
+    /// The joints that do move the vertex, with their weights.
+    pub fn joints(&self) -> impl Iterator<Item = (usize, f64)> {
+        let all = self.joints.into_iter().zip(self.weights).filter(|(_, w)| *w > 0.0);
+        all.map(|(j, w)| (usize::from(j), f64::from(w)))
+    }
+
+    /// Where these transforms of the joints together take a point.
+    pub fn blend(&self, transforms: &[DAffine3], at: DVec3) -> DVec3 {
+        self.joints().map(|(j, w)| transforms[j].transform_point3(at) * w).sum()
+    }
 }
 
 /// The triangles that belong to one joint.
@@ -245,14 +258,12 @@ impl Armature {
         Ok(solid.with_landmarks(landmarks))
     }
 
-    /// The derivative by the amount of one morph.
-    pub(super) fn pull_morph(&self, name: &str, heads: &[DVec3], keypoints: &[DVec3]) -> Result<f64, GeomError> {
-        let Some(m) = self.skin.morphs.iter().find(|m| *m.name == *name) else {
-            return Err(GeomError::invalid(format!("the body has no morph `{name}`")));
-        };
+    /// From the derivatives by the heads and keypoints at rest to that by the amount of a morph; `None` if it has no such morph.
+    pub fn pull_morph(&self, name: &str, heads: &[DVec3], keypoints: &[DVec3]) -> Option<f64> {
+        let m = self.skin.morphs.iter().find(|m| *m.name == *name)?;
         let by_heads: f64 = m.heads.iter().zip(heads).map(|(d, g)| d.dot(*g)).sum();
         let points = self.skin.anchors.iter().zip(keypoints);
-        Ok(by_heads + points.map(|(anchor, g)| m.at(*anchor).dot(*g)).sum::<f64>())
+        Some(by_heads + points.map(|(anchor, g)| m.at(*anchor).dot(*g)).sum::<f64>())
     }
 
     pub(super) fn skin(&self) -> Arc<Skin> {
@@ -288,13 +299,11 @@ impl Armature {
         let mut add = |joint: usize, weight: f64, at: DVec3, g: DVec3| {
             let g = g * weight;
             let m = &mut out[joint];
-            m.matrix3 += glam::DMat3::from_cols(g * at.x, g * at.y, g * at.z);
+            m.matrix3 += outer(g, at);
             m.translation += g;
         };
         for ((p, i), g) in self.positions().iter().zip(&self.skin.influences).zip(by_vertex) {
-            for (j, w) in i.joints.iter().zip(i.weights).filter(|(_, w)| *w > 0.0) {
-                add(usize::from(*j), f64::from(w), p.as_dvec3(), *g);
-            }
+            i.joints().for_each(|(j, w)| add(j, w, p.as_dvec3(), *g));
         }
         for (k, g) in self.rig.keypoints().iter().zip(by_keypoint) {
             add(k.joint, 1.0, k.rest, *g);
@@ -308,11 +317,8 @@ impl Armature {
     /// A pose that is not finite.
     pub fn posed_vertices(&self, pose: &[JointPose], rules: &Rules) -> Result<Vec<DVec3>, GeomError> {
         let t = self.rig.transforms(pose, rules)?;
-        let one = |(p, i): (&Vec3, &Influence)| {
-            let terms = i.joints.iter().zip(i.weights).filter(|(_, w)| *w > 0.0);
-            terms.map(|(j, w)| t[usize::from(*j)].transform_point3(p.as_dvec3()) * f64::from(w)).sum()
-        };
-        Ok(self.positions().iter().zip(&self.skin.influences).map(one).collect())
+        let all = self.positions().iter().zip(&self.skin.influences);
+        Ok(all.map(|(p, i)| i.blend(&t, p.as_dvec3())).collect())
     }
 }
 
@@ -366,7 +372,7 @@ fn parts(joints: usize, triangles: &[[u32; 3]], influences: &[Influence]) -> Vec
         for v in &vertices {
             own[*v as usize] = u32::MAX;
             let i = &influences[*v as usize];
-            used.extend(i.joints.iter().zip(i.weights).filter(|(_, w)| *w > 0.0).map(|(j, _)| *j));
+            used.extend(i.joints().map(|(j, _)| j as u16));
         }
         used.sort_unstable();
         used.dedup();

@@ -1,7 +1,7 @@
 //! Other proportions: bones made longer or shorter at rest, with what hangs on them moved along.
 
 use super::{Armature, Rig};
-use crate::geom::GeomError;
+use crate::geom::{GeomError, outer};
 use glam::{DAffine3, DMat3, DVec3};
 
 /// How a bone's surroundings are stretched about its head.
@@ -19,7 +19,7 @@ impl Stretch {
         match self {
             Stretch::Along(f) => {
                 let along = bone.normalize_or_zero();
-                DMat3::IDENTITY + DMat3::from_cols(along * along.x, along * along.y, along * along.z) * (f - 1.0)
+                DMat3::IDENTITY + outer(along, along) * (f - 1.0)
             }
             Stretch::Axes(f) => DMat3::from_diagonal(f),
         }
@@ -50,12 +50,7 @@ impl Armature {
         let skin = self.skin();
         Ok(self.reshaped(&heads, &tails, &points, move |positions| {
             for (p, i) in positions.iter_mut().zip(&skin.influences) {
-                let at = p.as_dvec3();
-                let terms = i.joints.iter().zip(i.weights).filter(|(_, w)| *w > 0.0);
-                *p = terms
-                    .map(|(j, w)| maps[usize::from(*j)].transform_point3(at) * f64::from(w))
-                    .sum::<DVec3>()
-                    .as_vec3();
+                *p = i.blend(&maps, p.as_dvec3()).as_vec3();
             }
         }))
     }

@@ -62,14 +62,6 @@ impl Armature {
         }
         Ok(Some(BodyGradient { turns, heads, keypoints }))
     }
-
-    /// From the derivatives by the heads and keypoints at rest to those by the amounts of morphs.
-    ///
-    /// # Errors
-    /// A morph it does not have.
-    pub fn pull_morphs(&self, names: &[&str], heads: &[DVec3], keypoints: &[DVec3]) -> Result<Vec<f64>, GeomError> {
-        names.iter().map(|name| self.pull_morph(name, heads, keypoints)).collect()
-    }
 }
 
 fn vector(p: &JointPose) -> Option<DVec3> {

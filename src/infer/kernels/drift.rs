@@ -103,15 +103,9 @@ impl Drift {
     }
 
     fn propose_one(&self, trace: &Trace, t: Target, scale: f64, rng: &mut Stream) -> Option<Move> {
-        let dist = trace.dist(t)?;
-        let stored = trace.stored(t)?;
-        let support = dist.stored_support();
-        if support.is_discrete() {
-            return discrete_move(&support, &stored, scale, rng);
-        }
-        let mut y = Vec::with_capacity(support.free_dim());
-        support.to_free(&stored, &mut y);
-        let old_term = support.from_free(&y).1;
+        let Some((mut y, old_term)) = trace.free(t) else {
+            return discrete_move(&trace.dist(t)?.stored_support(), &trace.stored(t)?, scale, rng);
+        };
         let dimensions = y.len();
         // Now and then a much longer or shorter step: chains leave narrow places and settle in wide ones. The length does not
         // depend on the state, so the proposal stays symmetric.
@@ -212,13 +206,7 @@ impl Kernel for Drift {
 impl Drift {
     fn learn_spreads(&mut self, trace: &Trace, targets: &[Target]) {
         for t in targets {
-            let Some((dist, stored)) = trace.dist(*t).zip(trace.stored(*t)) else { continue };
-            let support = dist.stored_support();
-            if support.is_discrete() {
-                continue;
-            }
-            let mut y = Vec::with_capacity(support.free_dim());
-            support.to_free(&stored, &mut y);
+            let Some((y, _)) = trace.free(*t) else { continue };
             self.spreads.entry(trace.address_hash(*t)).or_default().add(&y);
         }
     }

@@ -106,14 +106,7 @@ impl Kernel for Slice {
         for target in targets {
             let mut coordinate = 0;
             // Read anew for each coordinate: the one before has moved.
-            while let (Some(dist), Some(stored)) = (trace.dist(target), trace.stored(target)) {
-                let support = dist.stored_support();
-                if support.is_discrete() || coordinate >= support.free_dim() {
-                    break;
-                }
-                let mut y = Vec::with_capacity(support.free_dim());
-                support.to_free(&stored, &mut y);
-                let jacobian = support.from_free(&y).1;
+            while let Some((y, jacobian)) = trace.free(target).filter(|(y, _)| coordinate < y.len()) {
                 let key = (trace.address_hash(target), coordinate);
                 let width = self.width(key);
                 let length = Line { trace, at, target, y, coordinate, jacobian }.step(width, &mut rng)?;

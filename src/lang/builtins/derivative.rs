@@ -28,6 +28,15 @@ pub(super) fn times(by: f64, slope: f64) -> f64 {
     if by == 0.0 { 0.0 } else { by * slope }
 }
 
+/// Element `i` of an array of numbers; a number stands for every element.
+fn number(v: &Value, i: usize) -> Option<f64> {
+    match v {
+        Value::Num(x) => Some(*x),
+        Value::Array(xs) => xs.get(i).copied(),
+        _ => None,
+    }
+}
+
 /// A function of one number, element by element: `slope(x, y)` is dy/dx.
 pub(super) fn unary(a: &Args, y: &Value, by: &Adjoint, slope: fn(f64, f64) -> f64) -> Option<Pulled> {
     fn go(x: &Value, y: &Value, by: &Adjoint, slope: fn(f64, f64) -> f64) -> Option<Adjoint> {
@@ -65,11 +74,7 @@ pub(super) fn binary(
             Some(slopes(*x, *y, *z).map(|s| Adjoint::Num(times(by.number(), s))))
         }
         (Value::Num(_) | Value::Array(_), Value::Num(_) | Value::Array(_), Value::Array(zs), by) => {
-            let at = |v: &Value, i: usize| match v {
-                Value::Num(x) => *x,
-                Value::Array(xs) => xs.get(i).copied().unwrap_or(f64::NAN),
-                _ => f64::NAN,
-            };
+            let at = |v: &Value, i: usize| number(v, i).unwrap_or(f64::NAN);
             let by = by.numbers(zs.len());
             let (mut gx, mut gy) = (Vec::with_capacity(zs.len()), Vec::with_capacity(zs.len()));
             for (i, (z, g)) in zs.iter().zip(by).enumerate() {
@@ -123,13 +128,8 @@ pub(super) fn one_of(values: &[&Value], order: &[usize], z: &Value, by: &Adjoint
         }
         (Value::Array(zs), by) if values.iter().all(|v| matches!(v, Value::Num(_) | Value::Array(_))) => {
             let by = by.numbers(zs.len());
-            let at = |v: &Value, i: usize| match v {
-                Value::Array(xs) => xs.get(i).copied(),
-                Value::Num(x) => Some(*x),
-                _ => None,
-            };
             for (i, (z, g)) in zs.iter().zip(by).enumerate().filter(|(_, (_, g))| *g != 0.0) {
-                let k = *order.iter().find(|k| at(values[**k], i) == Some(*z))?;
+                let k = *order.iter().find(|k| number(values[**k], i) == Some(*z))?;
                 match values[k] {
                     Value::Array(_) => all[k].add_element(zs.len(), i, Adjoint::Num(g)),
                     _ => all[k].add(Adjoint::Num(g)),

@@ -6,7 +6,7 @@
 use super::covariance::CovarianceValue;
 use super::elementwise::array_len;
 use super::matrix::Matrix;
-use super::{Arg, Args, Builtin, Derivative, Kind, Type, arg, opt};
+use super::{Arg, Args, Builtin, Kind, Type, arg, opt};
 use crate::dist::{self, Dist, FAMILIES, Family, ParamError};
 use crate::lang::error::Fault;
 use crate::lang::value::Value;
@@ -17,33 +17,17 @@ const SECTION: &str = "Distributions";
 /// The row of a family whose parameters are all numbers, documented by `dist`.
 macro_rules! scalar {
     ($name:literal, [$($p:ident),+], $made:expr) => {
-        Builtin {
-            name: $name,
-            module: "",
-            section: SECTION,
-            args: &const { params::<{ [$(stringify!($p)),+].len() }>($name) },
-            variadic: false,
-            returns: Type::Dist,
-            doc: family($name).doc,
-            kind: Kind::Distribution(|a| elementwise(a, &[], |[$($p),+]| $made)),
-            derivative: Derivative::Unknown,
-        }
+        other(
+            $name,
+            &const { params::<{ [$(stringify!($p)),+].len() }>($name) },
+            |a| elementwise(a, &[], |[$($p),+]| $made),
+        )
     };
 }
 
 /// The row of any other family.
 const fn other(name: &'static str, args: &'static [Arg], make: fn(&Args) -> Result<Dist, Fault>) -> Builtin {
-    Builtin {
-        name,
-        module: "",
-        section: SECTION,
-        args,
-        variadic: false,
-        returns: Type::Dist,
-        doc: family(name).doc,
-        kind: Kind::Distribution(make),
-        derivative: Derivative::Unknown,
-    }
+    Builtin::new(Kind::Distribution(make), name, SECTION, args, Type::Dist, family(name).doc)
 }
 
 pub(super) const TABLE: &[Builtin] = &[

@@ -1,21 +1,11 @@
 //! Forms: built-ins that are lowered to operations of their own, because they call functions or look at the whole trace.
 
-use super::{Arg, Builtin, Derivative, Form, Kind, Type, arg};
+use super::{Arg, Builtin, Form, Kind, Type, arg};
 
 const SECTION: &str = "Forms";
 
 const fn form(name: &'static str, args: &'static [Arg], returns: Type, doc: &'static str, form: Form) -> Builtin {
-    Builtin {
-        name,
-        module: "",
-        section: SECTION,
-        args,
-        variadic: false,
-        returns,
-        doc,
-        kind: Kind::Form(form),
-        derivative: Derivative::Unknown,
-    }
+    Builtin::new(Kind::Form(form), name, SECTION, args, returns, doc)
 }
 
 pub(super) const TABLE: &[Builtin] = &[

@@ -3,7 +3,7 @@
 //! This is their documentation and their arguments; what they do is the business of the engine. They are not values of
 //! the model.
 
-use super::{Arg, Builtin, Derivative, Kind, Type, arg, opt};
+use super::{Arg, Builtin, Kind, Type, arg, opt};
 
 const KERNELS: &str = "Kernels";
 const CHOICES: &str = "Selections and starts";
@@ -20,17 +20,7 @@ const fn name(
     returns: Type,
     doc: &'static str,
 ) -> Builtin {
-    Builtin {
-        name,
-        module: "",
-        section,
-        args,
-        variadic: false,
-        returns,
-        doc,
-        kind: Kind::Inference,
-        derivative: Derivative::Unknown,
-    }
+    Builtin::new(Kind::Inference, name, section, args, returns, doc)
 }
 
 const SEL: Arg = arg("sel", Type::Selection, "The choices it moves.");

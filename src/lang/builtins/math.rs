@@ -3,7 +3,7 @@
 use super::derivative::{self, of_two, one_of};
 use super::elementwise::{binary, numeric, unary};
 use super::reduce::{largest, smallest};
-use super::{Arg, Args, Builtin, Pull, Pulled, Type, arg, function};
+use super::{Arg, Args, Builtin, Pulled, Type, arg, function};
 use crate::lang::adjoint::Adjoint;
 use crate::lang::error::Fault;
 use crate::lang::value::Value;
@@ -13,8 +13,12 @@ const SECTION: &str = "Math";
 const X: &[Arg] = &[arg("x", Type::Nums, "The argument.")];
 const ANGLE: &[Arg] = &[arg("x", Type::Nums, "An angle.").unit("radians")];
 
-const fn of_x(name: &'static str, doc: &'static str, f: fn(&Args) -> Result<Value, Fault>, pull: Pull) -> Builtin {
-    function(name, SECTION, X, Type::Nums, doc, f).pull(pull)
+/// The row of a function of one number with its slope, of x and y.
+macro_rules! smooth {
+    ($name:literal, $args:ident, $doc:literal, $f:expr, $slope:expr) => {
+        function($name, SECTION, $args, Type::Nums, $doc, |a| unary(a, $f))
+            .pull(|a, y, by| derivative::unary(a, y, by, $slope))
+    };
 }
 
 /// Constant between jumps.
@@ -22,36 +26,12 @@ const fn steps(name: &'static str, doc: &'static str, f: fn(&Args) -> Result<Val
     function(name, SECTION, X, Type::Nums, doc, f).flat()
 }
 
-const fn of_angle(name: &'static str, doc: &'static str, f: fn(&Args) -> Result<Value, Fault>, pull: Pull) -> Builtin {
-    function(name, SECTION, ANGLE, Type::Nums, doc, f).pull(pull)
-}
-
 pub(super) const TABLE: &[Builtin] = &[
-    of_x("exp", "The exponential.", |a| unary(a, libm::exp), |a, y, by| derivative::unary(a, y, by, |_, y| y)),
-    of_x(
-        "expm1",
-        "`exp(x) - 1`, accurate near 0.",
-        |a| unary(a, libm::expm1),
-        |a, y, by| derivative::unary(a, y, by, |_, y| y + 1.0),
-    ),
-    of_x(
-        "log",
-        "The natural logarithm; -inf at 0, NaN below.",
-        |a| unary(a, libm::log),
-        |a, y, by| derivative::unary(a, y, by, |x, _| 1.0 / x),
-    ),
-    of_x(
-        "log1p",
-        "`log(1 + x)`, accurate near 0.",
-        |a| unary(a, libm::log1p),
-        |a, y, by| derivative::unary(a, y, by, |x, _| 1.0 / (1.0 + x)),
-    ),
-    of_x(
-        "sqrt",
-        "The square root; NaN below 0.",
-        |a| unary(a, f64::sqrt),
-        |a, y, by| derivative::unary(a, y, by, |_, y| 0.5 / y),
-    ),
+    smooth!("exp", X, "The exponential.", libm::exp, |_, y| y),
+    smooth!("expm1", X, "`exp(x) - 1`, accurate near 0.", libm::expm1, |_, y| y + 1.0),
+    smooth!("log", X, "The natural logarithm; -inf at 0, NaN below.", libm::log, |x, _| 1.0 / x),
+    smooth!("log1p", X, "`log(1 + x)`, accurate near 0.", libm::log1p, |x, _| 1.0 / (1.0 + x)),
+    smooth!("sqrt", X, "The square root; NaN below 0.", f64::sqrt, |_, y| 0.5 / y),
     function(
         "pow",
         SECTION,
@@ -61,7 +41,7 @@ pub(super) const TABLE: &[Builtin] = &[
         |a| binary(a, libm::pow),
     )
     .pull(|a, z, by| of_two(a, z, by, pow_slopes)),
-    of_x("abs", "The absolute value.", |a| unary(a, f64::abs), |a, y, by| derivative::unary(a, y, by, |x, _| sign(x))),
+    smooth!("abs", X, "The absolute value.", f64::abs, |x, _| sign(x)),
     steps("sign", "-1, 0 or 1.", |a| unary(a, sign)),
     steps("step", "0 below 0, 1 from 0 on.", |a| unary(a, step)),
     steps("floor", "The next whole number below.", |a| unary(a, libm::floor)),
@@ -101,37 +81,12 @@ pub(super) const TABLE: &[Builtin] = &[
     )
     // The bounds first, of which the upper one wins: at a bound the argument moves nothing.
     .pull(|a, z, by| one_of(a.values, &[2, 1, 0], z, by)),
-    of_angle("sin", "The sine.", |a| unary(a, libm::sin), |a, y, by| derivative::unary(a, y, by, |x, _| libm::cos(x))),
-    of_angle(
-        "cos",
-        "The cosine.",
-        |a| unary(a, libm::cos),
-        |a, y, by| derivative::unary(a, y, by, |x, _| -libm::sin(x)),
-    ),
-    of_angle(
-        "tan",
-        "The tangent.",
-        |a| unary(a, libm::tan),
-        |a, y, by| derivative::unary(a, y, by, |_, y| 1.0 + y * y),
-    ),
-    of_x(
-        "asin",
-        "The angle in [-pi/2, pi/2] with this sine.",
-        |a| unary(a, libm::asin),
-        |a, y, by| derivative::unary(a, y, by, |x, _| 1.0 / (1.0 - x * x).sqrt()),
-    ),
-    of_x(
-        "acos",
-        "The angle in [0, pi] with this cosine.",
-        |a| unary(a, libm::acos),
-        |a, y, by| derivative::unary(a, y, by, |x, _| -1.0 / (1.0 - x * x).sqrt()),
-    ),
-    of_x(
-        "atan",
-        "The angle in (-pi/2, pi/2) with this tangent.",
-        |a| unary(a, libm::atan),
-        |a, y, by| derivative::unary(a, y, by, |x, _| 1.0 / (1.0 + x * x)),
-    ),
+    smooth!("sin", ANGLE, "The sine.", libm::sin, |x, _| libm::cos(x)),
+    smooth!("cos", ANGLE, "The cosine.", libm::cos, |x, _| -libm::sin(x)),
+    smooth!("tan", ANGLE, "The tangent.", libm::tan, |_, y| 1.0 + y * y),
+    smooth!("asin", X, "The angle in [-pi/2, pi/2] with this sine.", libm::asin, |x, _| 1.0 / (1.0 - x * x).sqrt()),
+    smooth!("acos", X, "The angle in [0, pi] with this cosine.", libm::acos, |x, _| -1.0 / (1.0 - x * x).sqrt()),
+    smooth!("atan", X, "The angle in (-pi/2, pi/2) with this tangent.", libm::atan, |x, _| 1.0 / (1.0 + x * x)),
     function(
         "atan2",
         SECTION,
@@ -146,24 +101,9 @@ pub(super) const TABLE: &[Builtin] = &[
             [x / square, -y / square]
         })
     }),
-    of_x(
-        "sinh",
-        "The hyperbolic sine.",
-        |a| unary(a, libm::sinh),
-        |a, y, by| derivative::unary(a, y, by, |x, _| libm::cosh(x)),
-    ),
-    of_x(
-        "cosh",
-        "The hyperbolic cosine.",
-        |a| unary(a, libm::cosh),
-        |a, y, by| derivative::unary(a, y, by, |x, _| libm::sinh(x)),
-    ),
-    of_x(
-        "tanh",
-        "The hyperbolic tangent.",
-        |a| unary(a, libm::tanh),
-        |a, y, by| derivative::unary(a, y, by, |_, y| 1.0 - y * y),
-    ),
+    smooth!("sinh", X, "The hyperbolic sine.", libm::sinh, |x, _| libm::cosh(x)),
+    smooth!("cosh", X, "The hyperbolic cosine.", libm::cosh, |x, _| libm::sinh(x)),
+    smooth!("tanh", X, "The hyperbolic tangent.", libm::tanh, |_, y| 1.0 - y * y),
     function(
         "deg",
         SECTION,
@@ -173,30 +113,12 @@ pub(super) const TABLE: &[Builtin] = &[
         |a| unary(a, |x| x * (std::f64::consts::PI / 180.0)),
     )
     .pull(|a, y, by| derivative::unary(a, y, by, |_, _| std::f64::consts::PI / 180.0)),
-    of_x(
-        "logit",
-        "`log(p / (1 - p))`, for probabilities.",
-        |a| unary(a, logit),
-        |a, y, by| derivative::unary(a, y, by, |x, _| 1.0 / (x * (1.0 - x))),
-    ),
-    of_x(
-        "expit",
-        "`1 / (1 + exp(-x))`, the inverse of `logit`.",
-        |a| unary(a, expit),
-        |a, y, by| derivative::unary(a, y, by, |_, y| y * (1.0 - y)),
-    ),
-    of_x(
-        "erf",
-        "The error function.",
-        |a| unary(a, libm::erf),
-        |a, y, by| derivative::unary(a, y, by, |x, _| std::f64::consts::FRAC_2_SQRT_PI * libm::exp(-x * x)),
-    ),
-    of_x(
-        "lgamma",
-        "The logarithm of the absolute value of the gamma function.",
-        |a| unary(a, libm::lgamma),
-        |a, y, by| derivative::unary(a, y, by, |x, _| crate::num::digamma(x)),
-    ),
+    smooth!("logit", X, "`log(p / (1 - p))`, for probabilities.", logit, |x, _| 1.0 / (x * (1.0 - x))),
+    smooth!("expit", X, "`1 / (1 + exp(-x))`, the inverse of `logit`.", expit, |_, y| y * (1.0 - y)),
+    smooth!("erf", X, "The error function.", libm::erf, |x, _| std::f64::consts::FRAC_2_SQRT_PI * libm::exp(-x * x)),
+    smooth!("lgamma", X, "The logarithm of the absolute value of the gamma function.", libm::lgamma, |x, _| {
+        crate::num::digamma(x)
+    }),
 ];
 
 /// The derivatives of x^y.

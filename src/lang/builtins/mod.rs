@@ -178,17 +178,7 @@ const fn function(
     doc: &'static str,
     f: fn(&Args) -> Result<Value, Fault>,
 ) -> Builtin {
-    Builtin {
-        name,
-        module: "",
-        section,
-        args,
-        variadic: false,
-        returns,
-        doc,
-        kind: Kind::Function(f),
-        derivative: Derivative::Unknown,
-    }
+    Builtin::new(Kind::Function(f), name, section, args, returns, doc)
 }
 
 impl fmt::Debug for Builtin {
@@ -198,6 +188,19 @@ impl fmt::Debug for Builtin {
 }
 
 impl Builtin {
+    /// One of the language's own namespace, of which no derivative is known.
+    const fn new(
+        kind: Kind,
+        name: &'static str,
+        section: &'static str,
+        args: &'static [Arg],
+        returns: Type,
+        doc: &'static str,
+    ) -> Builtin {
+        let derivative = Derivative::Unknown;
+        Builtin { name, module: "", section, args, variadic: false, returns, doc, kind, derivative }
+    }
+
     /// The same with a last argument that may be given any number of times.
     const fn variadic(self) -> Builtin {
         Builtin { variadic: true, ..self }

@@ -157,7 +157,7 @@ fn flatten(by: &Adjoint, n: usize, out: &mut Vec<f64>) {
     }
 }
 
-impl Reverse<'_> {
+impl<'a> Reverse<'a> {
     /// Whether a node's value depends on a target; if so it is put in order.
     fn visit(&mut self, root: NodeId) -> bool {
         // A node, its inputs, how many of them are done, whether it is active by now.
@@ -206,6 +206,12 @@ impl Reverse<'_> {
             Value::Container(r) => r.node + 1,
             _ => n,
         })
+    }
+
+    /// The values of a call's arguments.
+    fn values(&self, frame: FrameId, args: &[Operand]) -> SmallVec<[&'a Value; 8]> {
+        let (graph, code) = (self.graph, self.code);
+        args.iter().map(|a| graph.plain(code, frame, *a, &mut Deps::new())).collect()
     }
 
     fn is_active(&self, n: NodeId) -> bool {

@@ -6,6 +6,7 @@ use crate::lang::adjoint::Adjoint;
 use crate::lang::builtins::{Args, Builtin, Derivative, Kind};
 use crate::lang::code::{DistSpec, Op, Operand};
 use crate::lang::value::Value;
+use crate::num::accumulate;
 use crate::trace::choices::Target;
 use crate::trace::demand::Failure;
 use crate::trace::node::*;
@@ -214,8 +215,7 @@ impl Reverse<'_> {
         by: &Adjoint,
     ) -> Result<(), Failure> {
         let g = self.graph;
-        let mut deps = Deps::new();
-        let values: SmallVec<[&Value; 8]> = args.iter().map(|a| g.plain(self.code, frame, *a, &mut deps)).collect();
+        let values = self.values(frame, args);
         let a = Args { builtin, values: &values };
         let pulled = match (builtin.kind, builtin.derivative, &g.nodes[n as usize].value) {
             (Kind::Distribution(_), _, Value::Dist(d)) => {
@@ -302,8 +302,7 @@ impl Reverse<'_> {
             let part = one.by_bounds(&x, by.element(i).number())?;
             let part = if moved { part } else { vec![0.0; part.len()] };
             if matches!(dist, Dist::Iid(_)) {
-                all.resize(part.len(), 0.0);
-                all.iter_mut().zip(part).for_each(|(a, p): (&mut f64, f64)| *a += p);
+                accumulate(&mut all, &part);
             } else {
                 all.extend(part);
             }

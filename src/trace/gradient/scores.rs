@@ -6,6 +6,7 @@ use crate::lang::adjoint::Adjoint;
 use crate::lang::builtins::{Args, CovarianceValue};
 use crate::lang::code::{DistSpec, Op};
 use crate::lang::value::Value;
+use crate::num::accumulate;
 use crate::trace::demand::Failure;
 use crate::trace::node::*;
 use smallvec::SmallVec;
@@ -91,14 +92,12 @@ impl Reverse<'_> {
         dist: &Dist,
         params: Vec<f64>,
     ) -> Result<(), Failure> {
-        let (g, frame) = (self.graph, self.graph.nodes[n as usize].frame);
+        let frame = self.graph.nodes[n as usize].frame;
         match spec {
             DistSpec::Value(o) => self.give(frame, *o, Adjoint::Array(params)),
             DistSpec::Family { builtin, args } => {
                 let builtin = self.code.builtins.get(*builtin);
-                let mut deps = Deps::new();
-                let values: SmallVec<[&Value; 8]> =
-                    args.iter().map(|a| g.plain(self.code, frame, *a, &mut deps)).collect();
+                let values = self.values(frame, args);
                 let mut pulled = by_arguments(&Args { builtin, values: &values }, dist, &params);
                 pulled
                     .iter_mut()
@@ -131,9 +130,8 @@ impl Reverse<'_> {
         weight: f64,
     ) -> Result<(), Failure> {
         let DistSpec::Family { builtin, args } = spec else { return Ok(()) };
-        let (g, frame) = (self.graph, self.graph.nodes[n as usize].frame);
-        let mut deps = Deps::new();
-        let values: SmallVec<[&Value; 8]> = args.iter().map(|a| g.plain(self.code, frame, *a, &mut deps)).collect();
+        let frame = self.graph.nodes[n as usize].frame;
+        let values = self.values(frame, args);
         let (i, which) = match (dist, values.get(1)) {
             (Dist::Gp(_), _) => (1, Matrix::Kernel),
             (Dist::MvNormal(_), Some(Value::Unit)) => (2, Matrix::Factor),
@@ -187,8 +185,7 @@ fn of_value(dist: &Dist, value: &Value) -> Option<(Adjoint, Vec<f64>)> {
         for x in xs.iter() {
             let g = dist.gradient(&Datum::Num(*x))?;
             by_x.push(g.x.first().copied().unwrap_or(0.0));
-            params.resize(g.params.len(), 0.0);
-            params.iter_mut().zip(g.params).for_each(|(a, b): (&mut f64, f64)| *a += b);
+            accumulate(&mut params, &g.params);
         }
         return Some((Adjoint::Array(by_x), params));
     }
@@ -199,8 +196,7 @@ fn of_value(dist: &Dist, value: &Value) -> Option<(Adjoint, Vec<f64>)> {
         for x in xs.iter() {
             let (one, own) = of_value(dist, x)?;
             by_x.push(one);
-            params.resize(own.len(), 0.0);
-            params.iter_mut().zip(own).for_each(|(a, b): (&mut f64, f64)| *a += b);
+            accumulate(&mut params, &own);
         }
         return Some((Adjoint::List(by_x), params));
     }

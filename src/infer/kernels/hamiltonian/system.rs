@@ -1,9 +1,9 @@
 //! The dynamical system behind a trace: positions, densities and forces, and leapfrog steps.
 
-use crate::dist::Support;
 use crate::infer::kernel::{At, recoverable};
 use crate::rng::Stream;
 use crate::trace::{Change, Target, Trace, TraceResult};
+use std::ops::Range;
 
 /// A place with its log density and force.
 #[derive(Clone, Debug, Default)]
@@ -22,12 +22,9 @@ pub(super) struct System<'a> {
     trace: &'a mut Trace,
     at: &'a At,
     targets: Vec<Target>,
-    /// By target: where its coordinates begin.
-    starts: Vec<usize>,
-    dimensions: usize,
+    /// By target: where its coordinates are.
+    ranges: Vec<Range<usize>>,
     jacobian: f64,
-    /// Gradients taken.
-    pub gradients: u32,
 }
 
 impl<'a> System<'a> {
@@ -41,25 +38,17 @@ impl<'a> System<'a> {
             trace,
             at,
             targets: Vec::with_capacity(all.len()),
-            starts: Vec::with_capacity(all.len()),
-            dimensions: 0,
+            ranges: Vec::with_capacity(all.len()),
             jacobian: 0.0,
-            gradients: 0,
         };
         let mut y = Vec::with_capacity(all.len());
         for t in all {
-            let (Some(dist), Some(stored)) = (system.trace.dist(*t), system.trace.stored(*t)) else { continue };
-            let support: Support = dist.stored_support();
-            if support.is_discrete() || support.free_dim() == 0 {
-                continue;
-            }
-            let from = y.len();
-            support.to_free(&stored, &mut y);
-            system.jacobian += support.from_free(&y[from..]).1;
+            let Some((own, jacobian)) = system.trace.free(*t).filter(|(own, _)| !own.is_empty()) else { continue };
             system.targets.push(*t);
-            system.starts.push(from);
+            system.ranges.push(y.len()..y.len() + own.len());
+            system.jacobian += jacobian;
+            y.extend(own);
         }
-        system.dimensions = y.len();
         if y.is_empty() {
             return Ok(None);
         }
@@ -70,19 +59,16 @@ impl<'a> System<'a> {
     }
 
     pub fn dimensions(&self) -> usize {
-        self.dimensions
+        self.ranges.last().map_or(0, |r| r.end)
     }
 
     /// The addresses of the choices, and how many coordinates each has: what a metric belongs to.
     pub fn signature(&self) -> Vec<(u64, usize)> {
-        let ends = self.starts.iter().skip(1).copied().chain([self.dimensions]);
-        let sizes = self.starts.iter().zip(ends).map(|(a, b)| b - a);
-        self.targets.iter().zip(sizes).map(|(t, n)| (self.trace.address_hash(*t), n)).collect()
+        self.targets.iter().zip(&self.ranges).map(|(t, r)| (self.trace.address_hash(*t), r.len())).collect()
     }
 
     fn force(&mut self, point: &mut Point) -> TraceResult<()> {
         point.gradient.clear();
-        self.gradients += 1;
         self.trace.gradient(&self.targets, self.at.power, &mut point.gradient)
     }
 
@@ -91,8 +77,7 @@ impl<'a> System<'a> {
         if y.iter().any(|x| !x.is_finite()) {
             return Ok(None);
         }
-        let ends = self.starts.iter().skip(1).copied().chain([self.dimensions]);
-        let parts = self.starts.iter().zip(ends).map(|(a, b)| y[*a..b].to_vec());
+        let parts = self.ranges.iter().map(|r| y[r.clone()].to_vec());
         let changes: Vec<(Target, Change)> = self.targets.iter().copied().zip(parts.map(Change::Free)).collect();
         let Some(w) = recoverable(self.trace.propose(&changes, self.at.draws(0)))? else { return Ok(None) };
         let log_density = self.at.tempered(&w) + w.log_jacobian - self.jacobian;

@@ -145,11 +145,9 @@ fn pull_shaped(a: &Args, _: &Value, by: &Adjoint) -> Option<Pulled> {
     let Value::Record(amounts) = a.get(1) else { return None };
     let (heads, points) = (body.rig().joints().len(), body.rig().keypoints().len());
     let all = vectors(by, heads + points);
-    let names: Vec<&str> = amounts.keys().map(|k| &**k).collect();
-    let slopes = body.pull_morphs(&names, &all[..heads], &all[heads..]).ok()?;
-    let fields = amounts.keys().zip(slopes).map(|(k, g)| (Arc::clone(k), Adjoint::Num(g)));
+    let slope = |k: &Arc<str>| Some((Arc::clone(k), Adjoint::Num(body.pull_morph(k, &all[..heads], &all[heads..])?)));
     // Offsets add up: what was there moves as before.
-    Some(smallvec![by.clone(), Adjoint::Record(fields.collect())])
+    Some(smallvec![by.clone(), Adjoint::Record(amounts.keys().map(slope).collect::<Option<_>>()?)])
 }
 
 fn vectors(by: &Adjoint, n: usize) -> Vec<DVec3> {

@@ -15,7 +15,7 @@ mod shapes;
 pub use objects::{AffineValue, ArmatureValue, CameraValue, SolidValue, ViewValue};
 pub use observed::{DepthValue, ImageValue, KeypointsValue, MaskValue};
 
-use super::{Arg, Args, Builtin, Derivative, Kind, Type};
+use super::{Arg, Args, Builtin, Type, function};
 use crate::geom::GeomError;
 use crate::lang::error::{Fault, FaultKind};
 use crate::lang::value::Value;
@@ -35,17 +35,7 @@ const fn native(
     doc: &'static str,
     f: fn(&Args) -> Result<Value, Fault>,
 ) -> Builtin {
-    Builtin {
-        name,
-        module: "scene",
-        section,
-        args,
-        variadic: false,
-        returns,
-        doc,
-        kind: Kind::Function(f),
-        derivative: Derivative::Unknown,
-    }
+    Builtin { module: "scene", ..function(name, section, args, returns, doc, f) }
 }
 
 /// All of them.

@@ -1,7 +1,7 @@
 //! Scene values as objects of the language.
 
 use crate::geom::armature::Armature;
-use crate::geom::{Affine, Solid};
+use crate::geom::{Affine, Solid, outer};
 use crate::lang::adjoint::Adjoint;
 use crate::lang::index::xyz;
 use crate::lang::value::{Object, Value};
@@ -67,7 +67,7 @@ impl Object for AffineValue {
             let mut inner = Vec::with_capacity(by.len());
             for (l, g) in landmarks.iter().zip(by.chunks_exact(3)) {
                 let (p, g) = (l.position, DVec3::from_slice(g));
-                linear += DMat3::from_cols(g * p.x, g * p.y, g * p.z);
+                linear += outer(g, p);
                 shift += g;
                 inner.extend((a.matrix3.transpose() * g).to_array());
             }
@@ -76,9 +76,7 @@ impl Object for AffineValue {
         let b = other.downcast::<AffineValue>()?.0.0;
         let by = by.numbers(12);
         let (linear, shift) = (DMat3::from_cols_slice(&by[..9]), DVec3::from_slice(&by[9..]));
-        let t = b.translation;
-        let outer = DMat3::from_cols(shift * t.x, shift * t.y, shift * t.z);
-        let left = affine_adjoint(linear * b.matrix3.transpose() + outer, shift);
+        let left = affine_adjoint(linear * b.matrix3.transpose() + outer(shift, b.translation), shift);
         Some([left, affine_adjoint(a.matrix3.transpose() * linear, a.matrix3.transpose() * shift)])
     }
 
