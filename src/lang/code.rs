@@ -277,6 +277,15 @@ pub enum Op {
         /// When false.
         otherwise: BlockId,
     },
+    /// A branch whose alternatives are slots of this block (see [`super::flatten`]): only the one taken is asked for.
+    Select {
+        /// The condition.
+        cond: Operand,
+        /// When true.
+        then: Operand,
+        /// When false.
+        otherwise: Operand,
+    },
     /// A function value, closing over this frame.
     Closure(BlockId),
     /// `for x in e { … }`: holds one frame a pass.
@@ -371,7 +380,7 @@ impl Op {
                 }
                 args.iter().for_each(|(_, a)| f(*a));
             }
-            Op::If { cond, .. } => f(*cond),
+            Op::If { cond, .. } | Op::Select { cond, .. } => f(*cond),
             Op::For { iter, .. } => f(*iter),
             Op::Map { f: g, over, .. } => {
                 f(*g);
@@ -438,16 +447,22 @@ impl Code {
 
     /// Fills in what follows from the operations: in-block users and effects.
     pub fn finish(&mut self) {
+        super::flatten::flatten(self);
         for block in &mut self.blocks {
             let mut users = vec![Vec::new(); block.ops.len()];
             for (slot, op) in block.ops.iter().enumerate() {
-                op.operands(|o| {
+                let mut uses = |o| {
                     if let Operand::Local(s) = o
                         && users[s as usize].last() != Some(&(slot as Slot))
                     {
                         users[s as usize].push(slot as Slot);
                     }
-                });
+                };
+                op.operands(&mut uses);
+                if let Op::Select { then, otherwise, .. } = op {
+                    uses(*then);
+                    uses(*otherwise);
+                }
                 if matches!(op, Op::Gather) {
                     users[slot - 1].push(slot as Slot);
                 }

@@ -7,6 +7,7 @@ pub mod adjoint;
 pub mod builtins;
 pub mod code;
 pub mod error;
+mod flatten;
 pub mod index;
 pub mod key;
 pub mod load;

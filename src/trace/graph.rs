@@ -276,6 +276,10 @@ impl Graph {
                 None if self.has_own_value(n) => {}
                 None => default.iter().copied().for_each(operand),
             },
+            Op::Select { cond, then, otherwise } => {
+                operand(*cond);
+                operand(if self.nodes[n as usize].flags & OTHERWISE == 0 { *then } else { *otherwise });
+            }
             // Arguments are held by the parameters that read them.
             Op::Call { callee, .. } => {
                 if let Callee::Value(v) = callee {

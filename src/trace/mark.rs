@@ -58,7 +58,18 @@ impl Graph {
 
     /// Marks a user in the same frame. An argument's change goes to the parameter it feeds, past the call itself.
     fn mark_static_user(&mut self, code: &Code, n: NodeId, user: NodeId) {
-        let Op::Call { callee, args, .. } = self.op(code, user) else { return self.mark(code, user) };
+        let (callee, args) = match self.op(code, user) {
+            Op::Call { callee, args, .. } => (callee, args),
+            Op::Select { cond, then, otherwise } => {
+                let node = &self.nodes[user as usize];
+                let taken = if node.flags & OTHERWISE == 0 { then } else { otherwise };
+                if [cond, taken].iter().any(|o| self.resolve(node.frame, **o) == Some(n)) {
+                    self.mark(code, user);
+                }
+                return;
+            }
+            _ => return self.mark(code, user),
+        };
         let Some(Side::Child(child)) = self.nodes[user as usize].side.as_deref() else { return self.mark(code, user) };
         let child = *child;
         let frame = self.nodes[user as usize].frame;

@@ -41,6 +41,8 @@ pub(crate) const TARGET: u8 = 2;
 pub(crate) const WAS_STALE: u8 = 4;
 /// The node is a choice with an improper distribution: nothing can draw it.
 pub(crate) const IMPROPER: u8 = 8;
+/// The node is a selection that reads its second alternative.
+pub(crate) const OTHERWISE: u8 = 16;
 
 /// A node.
 #[derive(Clone, Debug, Default)]
@@ -63,7 +65,7 @@ pub(crate) struct Node {
     pub outside: u32,
     /// How far its value can be trusted.
     pub state: State,
-    /// [`HELD`], [`TARGET`], [`WAS_STALE`], [`IMPROPER`].
+    /// [`HELD`], [`TARGET`], [`WAS_STALE`], [`IMPROPER`], [`OTHERWISE`].
     pub flags: u8,
 }
 

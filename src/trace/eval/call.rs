@@ -61,14 +61,7 @@ impl Graph {
         if let Some(m) = self.unready(frame, cond) {
             return self.need(code, m);
         }
-        let block = match self.value(code, frame, cond) {
-            Value::Bool(true) => then,
-            Value::Bool(false) => otherwise,
-            v => {
-                let message = format!("`if` needs a bool, got {}", v.type_name());
-                return Err(self.type_error(code, n, message));
-            }
-        };
+        let block = if self.holds(code, n, cond)? { then } else { otherwise };
         let keep = match self.nodes[n as usize].side.as_deref() {
             Some(Side::Child(c)) => self.frames[c.frame as usize].block == block,
             _ => false,
@@ -90,6 +83,48 @@ impl Graph {
             self.replace_child(code, n, child)?;
         }
         self.finish_child(code, n)
+    }
+
+    /// Whether a condition that is evaluated holds.
+    fn holds(&self, code: &Code, n: NodeId, cond: Operand) -> Result<bool, Failure> {
+        match self.value(code, self.nodes[n as usize].frame, cond) {
+            Value::Bool(b) => Ok(*b),
+            v => Err(self.type_error(code, n, format!("`if` needs a bool, got {}", v.type_name()))),
+        }
+    }
+
+    pub(super) fn evaluate_select(
+        &mut self,
+        code: &Code,
+        n: NodeId,
+        cond: Operand,
+        then: Operand,
+        otherwise: Operand,
+    ) -> Result<Step, Failure> {
+        let frame = self.nodes[n as usize].frame;
+        if let Some(m) = self.unready(frame, cond) {
+            return self.need(code, m);
+        }
+        let holds = self.holds(code, n, cond)?;
+        let (chosen, other) = if holds { (then, otherwise) } else { (otherwise, then) };
+        if let Some(m) = self.unready(frame, chosen) {
+            return self.need(code, m);
+        }
+        let flags = self.nodes[n as usize].flags;
+        if holds != (flags & OTHERWISE == 0) {
+            self.nodes[n as usize].flags ^= OTHERWISE;
+            if flags & HELD != 0 {
+                let outside = |o| !matches!(o, Operand::Local(_));
+                if let Some(d) = self.resolve(frame, chosen) {
+                    self.acquire(d, n, outside(chosen));
+                }
+                if let Some(d) = self.resolve(frame, other) {
+                    self.release(d, outside(other));
+                }
+            }
+        }
+        let value = self.value(code, frame, chosen).clone();
+        Ok(self.finish(code, n, value))
     }
 
     pub(super) fn evaluate_call(

@@ -63,6 +63,7 @@ impl Graph {
             Op::Index { base, keys } => self.evaluate_index(code, n, *base, keys),
             Op::Call { callee, args, site } => self.evaluate_call(code, n, *callee, args, *site),
             Op::If { cond, then, otherwise } => self.evaluate_if(code, n, *cond, *then, *otherwise),
+            Op::Select { cond, then, otherwise } => self.evaluate_select(code, n, *cond, *then, *otherwise),
             Op::For { iter, body } => self.evaluate_for(code, n, *iter, *body),
             Op::Map { f, over, site } => self.evaluate_map(code, n, *f, *over, *site),
             Op::Fold { f, init, over, site } => self.evaluate_fold(code, n, *f, *init, *over, *site),

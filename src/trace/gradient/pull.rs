@@ -44,6 +44,7 @@ impl Reverse<'_> {
                 Some(Side::Deps(deps)) => all.extend(deps.iter().map(|d| self.whole(*d))),
                 _ => {}
             },
+            Op::Select { .. } => all.extend(self.taken(n).and_then(|o| self.source(frame, o))),
             // The results of a map of a built-in.
             Op::Map { over, .. } if !matches!(side, Some(Side::Loop(_))) => all.extend(self.source(frame, *over)),
             Op::Draw { dist, .. } => {
@@ -112,11 +113,22 @@ impl Reverse<'_> {
                 }
                 _ => return Err(self.no_derivative(n, "what this call gives")),
             },
+            Op::Select { .. } => {
+                if let Some(o) = self.taken(n) {
+                    self.give(frame, o, by.clone());
+                }
+            }
             Op::Map { .. } => return Err(self.no_derivative(n, "what this map gives")),
             Op::Draw { dist, .. } => self.pull_realised(n, dist, by)?,
             _ => {}
         }
         Ok(())
+    }
+
+    /// The alternative that a selection reads.
+    fn taken(&self, n: NodeId) -> Option<Operand> {
+        let Op::Select { then, otherwise, .. } = self.graph.op(self.code, n) else { return None };
+        Some(if self.graph.nodes[n as usize].flags & OTHERWISE == 0 { *then } else { *otherwise })
     }
 
     fn is_builtin_call(&self, n: NodeId) -> bool {

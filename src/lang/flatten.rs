@@ -1,0 +1,61 @@
+//! Branches without structure of their own become slots of the block around them.
+//!
+//! An `if` makes a frame for the branch it takes. Where both branches only compute (no choices, observations, calls, loops),
+//! no frame is needed: their operations are appended to the block, and the `if` becomes a [`Op::Select`] that asks for one
+//! of the two results. Evaluation is by need, so the other branch is still not run, and what only it reads is not drawn.
+
+use super::code::{Block, BlockKind, Code, Op, Operand, Slot};
+use super::value::Value;
+
+/// Flattens every block, inner ones first.
+pub(super) fn flatten(code: &mut Code) {
+    let nothing = code.constant(Value::Unit);
+    for b in (0..code.blocks.len()).rev() {
+        for slot in 0..code.blocks[b].ops.len() {
+            let Op::If { cond, then, otherwise } = code.blocks[b].ops[slot] else { continue };
+            if !only_computes(&code.blocks[then as usize]) || !only_computes(&code.blocks[otherwise as usize]) {
+                continue;
+            }
+            let then = splice(code, b, then as usize, nothing);
+            let otherwise = splice(code, b, otherwise as usize, nothing);
+            code.blocks[b].ops[slot] = Op::Select { cond, then, otherwise };
+        }
+    }
+}
+
+fn only_computes(block: &Block) -> bool {
+    block.kind == BlockKind::Branch
+        && block.ops.iter().all(|op| {
+            matches!(op, Op::Prim { .. } | Op::Array(_) | Op::Record { .. } | Op::Index { .. } | Op::Select { .. })
+        })
+}
+
+/// Moves the operations of a branch to the end of the block around it, and gives its result as seen from there.
+fn splice(code: &mut Code, into: usize, branch: usize, nothing: Operand) -> Operand {
+    let (ops, spans) = (std::mem::take(&mut code.blocks[branch].ops), std::mem::take(&mut code.blocks[branch].spans));
+    let first = code.blocks[into].ops.len() as Slot;
+    let outwards = |o: &mut Operand| {
+        *o = match *o {
+            Operand::Const(i) => Operand::Const(i),
+            Operand::Local(s) => Operand::Local(first + s),
+            Operand::Outer { up: 1, slot } => Operand::Local(slot),
+            Operand::Outer { up, slot } => Operand::Outer { up: up - 1, slot },
+        };
+    };
+    for (mut op, span) in ops.into_iter().zip(spans) {
+        match &mut op {
+            Op::Prim { args, .. } | Op::Array(args) => args.iter_mut().for_each(outwards),
+            Op::Record { values, .. } => values.iter_mut().for_each(outwards),
+            Op::Index { base, keys } => {
+                outwards(base);
+                keys.iter_mut().for_each(outwards);
+            }
+            Op::Select { cond, then, otherwise } => [cond, then, otherwise].into_iter().for_each(outwards),
+            _ => {}
+        }
+        code.blocks[into].push(op, span);
+    }
+    let mut result = code.blocks[branch].result.take().unwrap_or(nothing);
+    outwards(&mut result);
+    result
+}
