@@ -3,7 +3,7 @@
 
 use criterion::{Criterion, criterion_group, criterion_main};
 use pcadlang::dist::Datum;
-use pcadlang::infer::{At, Drift, Kernel, Mh, Scope};
+use pcadlang::infer::{At, Drift, Kernel, Mh, Pick, Scope};
 use pcadlang::rng::{Purpose, StreamKey};
 use pcadlang::trace::{Address, AddressSegment, Change, Draws, Selector, Trace};
 use pcadlang::{Model, Program};
@@ -37,7 +37,7 @@ fn transitions(c: &mut Criterion) {
     for n in [10, 10_000] {
         for (how, one_by_one) in [("array", false), ("loop", true)] {
             let model = line(n, one_by_one);
-            let scope = || Scope { selector: Selector::All, one: true };
+            let scope = || Scope { selector: Selector::All, pick: Pick::One };
             let kernels: [(&str, Box<dyn Kernel>); 2] =
                 [("mh", Box::new(Mh::new(scope()))), ("drift", Box::new(Drift::new(scope(), Some(0.1))))];
             for (name, mut kernel) in kernels {
@@ -46,7 +46,7 @@ fn transitions(c: &mut Criterion) {
                 c.bench_function(&format!("linreg n={n} {how}: one {name} transition"), |b| {
                     b.iter(|| {
                         step += 1;
-                        let at = At { seed: 1, chain: 0, step, adapting: false, power: 1.0 };
+                        let at = At::new(1, 0, step);
                         kernel.step(&mut trace, &at).map(|o| o.accepted).unwrap_or_default()
                     });
                 });

@@ -5,7 +5,7 @@
 //! Without arguments, a table over both models and several sizes. Times are processor time of the one thread; for counts of
 //! instructions run it twice under `valgrind --tool=none`-like counters with different TRANSITIONS and take the difference.
 
-use pcadlang::infer::{At, Gibbs, Kernel, Scope};
+use pcadlang::infer::{At, Gibbs, Kernel, Pick, Scope};
 use pcadlang::lang::value::Value;
 use pcadlang::rng::{Purpose, StreamKey};
 use pcadlang::trace::{Selector, Trace};
@@ -25,7 +25,7 @@ fn main() {
     let mut trace = model.simulate(1, 0).unwrap_or_else(|e| panic!("{e}"));
     let started = cpu();
     let sel = Selector::Tag { name: if args.first().map(String::as_str) == Some("hmm") { "state".into() } else { "flag".into() }, value: None };
-    let mut kernel = Gibbs::new(Scope { selector: sel, one: true });
+    let mut kernel = Gibbs::new(Scope { selector: sel, pick: Pick::One });
     go(&mut kernel, &mut trace, 1000.min(count), 0);
     let warm = cpu();
     let accepted = go(&mut kernel, &mut trace, count, 1000);
@@ -36,7 +36,7 @@ fn main() {
 fn go(kernel: &mut dyn Kernel, trace: &mut Trace, count: usize, first: u64) -> u64 {
     let mut accepted = 0;
     for i in 0..count {
-        let at = At { seed: 1, chain: 0, step: first + i as u64, adapting: false, power: 1.0 };
+        let at = At::new(1, 0, first + i as u64);
         accepted += u64::from(kernel.step(trace, &at).unwrap_or_else(|e| panic!("{e}")).accepted);
     }
     accepted

@@ -2,17 +2,19 @@
 
 use super::{ParamError, Scalar, Slope, Support};
 use crate::rng::Stream;
+use std::sync::Arc;
 
 /// `categorical(weights)`: 0, 1, … with these weights, which need not sum to 1.
 #[derive(Clone, Debug, PartialEq)]
 pub struct Categorical {
-    weights: Box<[f64]>,
+    weights: Arc<[f64]>,
     total: f64,
 }
 
 impl Categorical {
     /// With these weights; fails unless all are finite and not negative, and their sum is positive and finite.
-    pub fn new(weights: &[f64]) -> Result<Categorical, ParamError> {
+    pub fn new(weights: impl Into<Arc<[f64]>>) -> Result<Categorical, ParamError> {
+        let weights = weights.into();
         if let Some(w) = weights.iter().find(|w| !(w.is_finite() && **w >= 0.0)) {
             return Err(ParamError::new(Self::NAME, "weights", w, "must be finite and not negative"));
         }
@@ -20,7 +22,7 @@ impl Categorical {
         if !(total > 0.0 && total.is_finite()) {
             return Err(ParamError::new(Self::NAME, "weights", total, "must have a positive, finite sum"));
         }
-        Ok(Categorical { weights: weights.into(), total })
+        Ok(Categorical { weights, total })
     }
 
     /// The probability of index `i`.
@@ -55,6 +57,7 @@ impl Scalar for Categorical {
             return f64::NEG_INFINITY;
         }
         match self.weights.get(x as usize) {
+            Some(w) if *w > 0.0 && self.total == 1.0 => libm::log(*w),
             Some(w) if *w > 0.0 => libm::log(*w) - libm::log(self.total),
             _ => f64::NEG_INFINITY,
         }

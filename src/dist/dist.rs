@@ -29,7 +29,7 @@ pub enum Dist {
     UniformDiscrete(UniformDiscrete),
     Binomial(Binomial),
     Poisson(Poisson),
-    Categorical(Arc<Categorical>),
+    Categorical(Categorical),
     TruncatedNormal(Arc<TruncatedNormal>),
     Multinomial(Arc<Multinomial>),
     Lkj(Arc<Lkj>),

@@ -97,13 +97,21 @@ impl Support {
 
     /// All values in ascending order, if they are truth values or at most [`MAX_ENUMERATED`] integers.
     pub fn finite_values(&self) -> Option<Vec<Datum>> {
+        let mut values = Vec::new();
+        self.list_values(&mut values).then_some(values)
+    }
+
+    /// The same into a list that is used again; false, and the list empty, if the support is not finite.
+    pub fn list_values(&self, values: &mut Vec<Datum>) -> bool {
+        values.clear();
         match self {
-            Support::Boolean => Some(vec![Datum::Bool(false), Datum::Bool(true)]),
+            Support::Boolean => values.extend([Datum::Bool(false), Datum::Bool(true)]),
             Support::Integers { lo, hi: Some(hi) } if self.is_finite() => {
-                Some((*lo..=*hi).map(|i| Datum::Num(i as f64)).collect())
+                values.extend((*lo..=*hi).map(|i| Datum::Num(i as f64)));
             }
-            _ => None,
+            _ => return false,
         }
+        true
     }
 
     /// Whether a value is of the right kind and size, be it inside or not.

@@ -3,6 +3,7 @@
 use crate::lang::error::RunError;
 use crate::rng::{Purpose, Stream, StreamKey};
 use crate::trace::{Draws, Selection, Selector, Target, Trace, TraceResult, Weight};
+use std::sync::Arc;
 
 /// Where in a chain a step is, and what randomness it may use.
 #[derive(Clone, Copy, Debug)]
@@ -17,9 +18,16 @@ pub struct At {
     pub adapting: bool,
     /// The power of the likelihood: 1 but for annealed burn-in.
     pub power: f64,
+    /// Which member of a sweep a step is for (see [`Kernel::sweep`]).
+    pub member: usize,
 }
 
 impl At {
+    /// A step of the posterior itself, outside of warm-up.
+    pub fn new(seed: u64, chain: u32, step: u64) -> Self {
+        At { seed, chain, step, adapting: false, power: 1.0, member: 0 }
+    }
+
     /// The randomness of values drawn inside the trace; `lane` tells alternatives of one step apart.
     pub fn draws(&self, lane: u64) -> Draws {
         Draws { key: StreamKey::new(self.seed, self.chain, Purpose::VALUES), step: self.step, lane }
@@ -66,6 +74,13 @@ pub trait Kernel: Send {
     /// Its name in tables.
     fn name(&self) -> String;
 
+    /// Begins a sweep, if the kernel goes through its choices in turn: how many steps it has. [`At::member`] tells which of
+    /// them a step is.
+    fn sweep(&mut self, trace: &mut Trace) -> Option<usize> {
+        let _ = trace;
+        None
+    }
+
     /// Moves the trace by one step.
     ///
     /// # Errors
@@ -73,13 +88,34 @@ pub trait Kernel: Send {
     fn step(&mut self, trace: &mut Trace, at: &At) -> TraceResult<Outcome>;
 }
 
+/// Which of the selected choices a step moves.
+#[derive(Clone, Copy, Debug, Default, PartialEq, Eq)]
+pub enum Pick {
+    /// All of them.
+    #[default]
+    All,
+    /// One of them at random (`one(sel)`).
+    One,
+    /// Each in turn, in the order of the program (`each(sel)`): a sweep of as many steps. Moves that would change what is
+    /// selected are rejected, so that the order does not depend on the outcome of the steps.
+    Each,
+}
+
 /// What a kernel works on: a selection, as a whole or one member at a time.
 #[derive(Clone, Debug, PartialEq)]
 pub struct Scope {
     /// The choices.
     pub selector: Selector,
-    /// Whether one of them is picked at each step (`one(sel)`).
-    pub one: bool,
+    /// Which of them a step moves.
+    pub pick: Pick,
+}
+
+impl Scope {
+    /// One or each of the choices at a time: one, if nothing is said.
+    pub(crate) fn single(self) -> Self {
+        let pick = if self.pick == Pick::All { Pick::One } else { self.pick };
+        Scope { pick, ..self }
+    }
 }
 
 /// A scope registered with a trace.
@@ -87,11 +123,19 @@ pub struct Scope {
 pub(crate) struct Registered {
     pub scope: Scope,
     selection: Option<Selection>,
+    sweep: Option<Sweep>,
+}
+
+/// The order of a sweep and the members it is of.
+#[derive(Clone, Debug)]
+struct Sweep {
+    of: Arc<Vec<Target>>,
+    order: Vec<Target>,
 }
 
 impl Registered {
     pub fn new(scope: Scope) -> Self {
-        Registered { scope, selection: None }
+        Registered { scope, selection: None, sweep: None }
     }
 
     /// The selection in this kernel's trace.
@@ -99,30 +143,52 @@ impl Registered {
         *self.selection.get_or_insert_with(|| trace.select(&self.scope.selector))
     }
 
-    /// One member, picked uniformly, and how many there are.
-    pub fn pick(&mut self, trace: &mut Trace, rng: &mut Stream) -> Option<(Target, usize)> {
+    /// How many steps a sweep over the members is, if steps are parts of sweeps.
+    pub fn sweep(&mut self, trace: &mut Trace) -> Option<usize> {
+        if self.scope.pick != Pick::Each {
+            return None;
+        }
+        let selection = self.selection(trace);
+        let of = trace.listed(selection);
+        if !self.sweep.as_ref().is_some_and(|s| Arc::ptr_eq(&s.of, of)) {
+            let (of, order) = (Arc::clone(of), trace.in_program_order(selection));
+            self.sweep = Some(Sweep { of, order });
+        }
+        Some(self.sweep.as_ref().map_or(0, |s| s.order.len()))
+    }
+
+    /// One member: picked uniformly, with how many there are, or the one a sweep has come to.
+    pub fn pick(&mut self, trace: &mut Trace, at: &At, rng: &mut Stream) -> Option<(Target, usize)> {
+        if self.scope.pick == Pick::Each {
+            if self.sweep.is_none() {
+                self.sweep(trace);
+            }
+            return self.sweep.as_ref()?.order.get(at.member).map(|t| (*t, 1));
+        }
         let selection = self.selection(trace);
         let targets = trace.targets(selection);
         (!targets.is_empty()).then(|| (targets[rng.index(targets.len())], targets.len()))
     }
 
     /// The members a step works on, and what picking them costs: the log of the number of ways.
-    pub fn members(&mut self, trace: &mut Trace, rng: &mut Stream) -> (Vec<Target>, f64) {
-        if self.scope.one {
-            match self.pick(trace, rng) {
-                Some((t, n)) => (vec![t], libm::log(n as f64)),
-                None => (Vec::new(), 0.0),
-            }
-        } else {
+    pub fn members(&mut self, trace: &mut Trace, at: &At, rng: &mut Stream) -> (Vec<Target>, f64) {
+        if self.scope.pick == Pick::All {
             let selection = self.selection(trace);
-            (trace.targets(selection).to_vec(), 0.0)
+            return (trace.targets(selection).to_vec(), 0.0);
+        }
+        match self.pick(trace, at, rng) {
+            Some((t, n)) => (vec![t], libm::log(n as f64)),
+            None => (Vec::new(), 0.0),
         }
     }
 
-    /// What picking the same members costs in the proposed state: single-site picking pays the ratio of the numbers.
-    pub fn ways_back(&mut self, trace: &Trace) -> f64 {
-        match (self.scope.one, self.selection) {
-            (true, Some(s)) => libm::log(trace.targets(s).len() as f64),
+    /// What picking the same members costs in the proposed state: single-site picking pays the ratio of the numbers, a sweep
+    /// cannot go on among other members.
+    pub fn ways_back(&self, trace: &Trace) -> f64 {
+        let Some(selection) = self.selection else { return 0.0 };
+        match (self.scope.pick, &self.sweep) {
+            (Pick::One, _) => libm::log(trace.targets(selection).len() as f64),
+            (Pick::Each, Some(s)) if !Arc::ptr_eq(&s.of, trace.listed(selection)) => f64::INFINITY,
             _ => 0.0,
         }
     }

@@ -17,6 +17,6 @@ mod selection;
 pub use chains::run_chains;
 pub use default_plan::default_plan;
 pub use init::{Start, StartError, starts};
-pub use kernel::{At, Kernel, Outcome, Scope};
+pub use kernel::{At, Kernel, Outcome, Pick, Scope};
 pub use kernels::{Block, Drift, Elliptical, Gibbs, Mh};
 pub use plan::{ChainError, ChainResult, Progress, RunOptions, Watch};

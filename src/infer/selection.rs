@@ -1,7 +1,7 @@
 //! From the selections people write to [`Selector`]s.
 
 use super::expr::{Scope, evaluate};
-use super::kernel;
+use super::kernel::{self, Pick};
 use crate::lang::error::{FaultKind, RunError};
 use crate::lang::key::Key;
 use crate::syntax::ast::{self, BinaryOp, Expr, ExprKind, SegmentName};
@@ -9,18 +9,25 @@ use crate::syntax::span::Span;
 use crate::trace::{ChoiceKind, Pattern, PatternSegment, Selector};
 use std::sync::Arc;
 
-/// Reads a selection, with `one(…)` around it or not.
+/// Reads a selection, with `one(…)` or `each(…)` around it or not.
 ///
 /// # Errors
 /// If the expression is not a selection, or a computed key fails.
 pub(crate) fn scope(e: &Expr, env: &mut Scope) -> Result<kernel::Scope, Box<RunError>> {
-    if let ExprKind::Call { callee, args } = &e.kind
-        && matches!(&callee.kind, ExprKind::Var(name) if &**name == "one")
-        && let [arg] = &args[..]
+    if let Some((name, [arg])) = super::plan::call(e)
+        && let Some(pick) = pick(name)
     {
-        return Ok(kernel::Scope { selector: selector(&arg.value, env)?, one: true });
+        return Ok(kernel::Scope { selector: selector(&arg.value, env)?, pick });
     }
-    Ok(kernel::Scope { selector: selector(e, env)?, one: false })
+    Ok(kernel::Scope { selector: selector(e, env)?, pick: Pick::All })
+}
+
+fn pick(name: &str) -> Option<Pick> {
+    match name {
+        "one" => Some(Pick::One),
+        "each" => Some(Pick::Each),
+        _ => None,
+    }
 }
 
 /// Reads a selection.

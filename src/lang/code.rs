@@ -37,6 +37,10 @@ pub enum Operand {
 pub struct Code {
     /// The blocks; block 0 is the top level.
     pub blocks: Vec<Block>,
+    /// The operations of all blocks, one block after the other, and what is known of the slot of each.
+    pub ops: Vec<Op>,
+    /// See `ops`.
+    pub slots: Vec<SlotFacts>,
     /// The constants.
     pub consts: Vec<Value>,
     /// The built-ins that indices in operations refer to.
@@ -99,18 +103,44 @@ pub struct Block {
     pub kind: BlockKind,
     /// The lexically enclosing block.
     pub parent: Option<BlockId>,
-    /// The operations, by slot.
+    /// The operations, by slot, while the block is being filled; then they go to [`Code::ops`].
     pub ops: Vec<Op>,
+    /// The index of its first operation in [`Code::ops`].
+    pub first: u32,
     /// Where each operation was written.
     pub spans: Vec<Span>,
     /// The value of the block.
     pub result: Option<Operand>,
     /// The slots that run whether or not anything asks for them: observations, factors, and what contains them.
     pub effects: Vec<Slot>,
-    /// By slot: whether it is among `effects`.
-    pub is_effect: Vec<bool>,
-    /// By slot: the slots of this block that have it as an operand.
-    pub users: Vec<Box<[Slot]>>,
+}
+
+/// What updates need to know of a slot.
+#[derive(Clone, Debug, Default)]
+pub struct SlotFacts {
+    /// The slot.
+    pub slot: Slot,
+    /// Whether it runs although nothing asks for it.
+    pub is_effect: bool,
+    /// Whether it is a random choice.
+    pub is_draw: bool,
+    /// Whether it is the result of its block.
+    pub is_result: bool,
+    /// The slots it reads whenever it is evaluated: how many levels out, and which; `None` where that depends on the state.
+    pub reads: Option<Box<[(u16, Slot)]>>,
+    /// The slots of the same block that have it as an operand.
+    pub users: Box<[Slot]>,
+    /// For a choice that only computations of its own block depend on: how its change spreads.
+    pub spread: Option<Spread>,
+}
+
+/// The part of a choice's scaffold that lies in its own block, where that is the same in every state.
+#[derive(Clone, Debug)]
+pub struct Spread {
+    /// What depends on the choice, each after what it reads, up to and including observations and other choices.
+    pub slots: Box<[Slot]>,
+    /// Whether none of them reads anything of another block.
+    pub is_closed: bool,
 }
 
 /// A place in the text that adds to addresses.
@@ -406,6 +436,25 @@ impl Op {
     }
 }
 
+impl Op {
+    /// Where its operands are, if those it always reads are all it holds.
+    fn reads(&self) -> Option<Box<[(u16, Slot)]>> {
+        if matches!(
+            self,
+            Op::Param { .. } | Op::Call { .. } | Op::Select { .. } | Op::Fold { .. } | Op::Gather
+        ) {
+            return None;
+        }
+        let mut reads = Vec::new();
+        self.operands(|o| match o {
+            Operand::Const(_) => {}
+            Operand::Local(slot) => reads.push((0, slot)),
+            Operand::Outer { up, slot } => reads.push((up, slot)),
+        });
+        Some(reads.into())
+    }
+}
+
 impl Block {
     /// An empty block.
     pub fn new(kind: BlockKind, parent: Option<BlockId>) -> Self {
@@ -415,10 +464,19 @@ impl Block {
             ops: Vec::new(),
             spans: Vec::new(),
             result: None,
+            first: 0,
             effects: Vec::new(),
-            is_effect: Vec::new(),
-            users: Vec::new(),
         }
+    }
+
+    /// How many slots it has.
+    pub fn len(&self) -> usize {
+        self.spans.len()
+    }
+
+    /// Whether it has none.
+    pub fn is_empty(&self) -> bool {
+        self.spans.is_empty()
     }
 
     /// Adds an operation and gives its slot.
@@ -448,7 +506,10 @@ impl Code {
     /// Fills in what follows from the operations: in-block users and effects.
     pub fn finish(&mut self) {
         super::flatten::flatten(self);
-        for block in &mut self.blocks {
+        let effects = self.find_effects();
+        for (block, is_effect) in self.blocks.iter_mut().zip(effects) {
+            block.effects = (0..block.ops.len() as Slot).filter(|s| is_effect[*s as usize]).collect();
+            block.first = self.ops.len() as u32;
             let mut users = vec![Vec::new(); block.ops.len()];
             for (slot, op) in block.ops.iter().enumerate() {
                 let mut uses = |o| {
@@ -467,14 +528,32 @@ impl Code {
                     users[slot - 1].push(slot as Slot);
                 }
             }
-            block.users = users.into_iter().map(Vec::into_boxed_slice).collect();
+            for (slot, (op, users)) in block.ops.drain(..).zip(users).enumerate() {
+                self.slots.push(SlotFacts {
+                    slot: slot as Slot,
+                    is_effect: is_effect[slot],
+                    is_draw: matches!(op, Op::Draw { .. }),
+                    is_result: block.result == Some(Operand::Local(slot as Slot)),
+                    reads: op.reads(),
+                    users: users.into(),
+                    spread: None,
+                });
+                self.ops.push(op);
+            }
+            let slots = &self.slots[block.first as usize..];
+            let spreads: Vec<_> = (0..slots.len())
+                .filter(|s| slots[*s].is_draw)
+                .map(|s| (s, super::spread::spread(&self.ops[block.first as usize..], slots, s as Slot)))
+                .collect();
+            for (slot, spread) in spreads {
+                self.slots[block.first as usize + slot].spread = spread;
+            }
         }
-        self.find_effects();
     }
 
     /// Marks the slots that observe, or hold or call a block that does. Calls of function values count if any function
     /// that is used as a value observes.
-    fn find_effects(&mut self) {
+    fn find_effects(&self) -> Vec<Vec<bool>> {
         let n = self.blocks.len();
         let mut observes = vec![false; n];
         let mut escaped_observes = false;
@@ -502,10 +581,8 @@ impl Code {
                 break;
             }
         }
-        for block in &mut self.blocks {
-            block.is_effect = block.ops.iter().map(|op| op_observes(op, &observes, escaped_observes)).collect();
-            block.effects = (0..block.ops.len() as Slot).filter(|s| block.is_effect[*s as usize]).collect();
-        }
+        let of = |b: &Block| b.ops.iter().map(|op| op_observes(op, &observes, escaped_observes)).collect();
+        self.blocks.iter().map(of).collect()
     }
 
     /// The value of a constant.

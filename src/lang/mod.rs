@@ -12,4 +12,5 @@ pub mod index;
 pub mod key;
 pub mod load;
 pub mod lower;
+mod spread;
 pub mod value;

@@ -38,6 +38,28 @@ impl ExactSum {
         if x.abs() < LARGE { self.fine -= (x * SCALE) as i128 } else { self.put(x, -1) }
     }
 
+    /// Whether all terms were finite and small.
+    #[inline]
+    fn is_fine(&self) -> bool {
+        self.coarse.is_none() && (self.negative | self.positive | self.nan) == 0
+    }
+
+    /// [`ExactSum::difference`] between two sums of sums: `new[0] + new[1] - …` above `old[0] + old[1] - …`, where the last of
+    /// each is taken out.
+    pub fn balance(new: [&ExactSum; 3], old: [&ExactSum; 3]) -> f64 {
+        if new.iter().chain(&old).all(|s| s.is_fine()) {
+            let fine = (new[0].fine + new[1].fine - new[2].fine) - (old[0].fine + old[1].fine - old[2].fine);
+            return fine as f64 / SCALE;
+        }
+        let total = |[a, b, without]: [&ExactSum; 3]| {
+            let mut sum = a.clone();
+            sum.merge(b);
+            sum.unmerge(without);
+            sum
+        };
+        ExactSum::difference(&total(new), &total(old))
+    }
+
     fn put(&mut self, x: f64, sign: i64) {
         if x.is_nan() {
             self.nan += sign;
@@ -111,6 +133,9 @@ impl ExactSum {
     /// Anything above an impossible `old` is +inf, an impossible `new` is -inf (also from an impossible `old`: a chain does not
     /// wander among impossible states); a NaN in `new` counts as impossible.
     pub fn difference(new: &ExactSum, old: &ExactSum) -> f64 {
+        if new.is_fine() && old.is_fine() {
+            return (new.fine - old.fine) as f64 / SCALE;
+        }
         if new.nan > 0 || new.negative > 0 {
             return f64::NEG_INFINITY;
         }

@@ -15,6 +15,7 @@ use crate::lang::code::{Code, Op};
 use crate::lang::error::FaultKind;
 use crate::lang::key::Key;
 use rustc_hash::FxHashMap;
+use smallvec::SmallVec;
 use std::sync::Arc;
 
 /// One thing a kernel can propose: a choice, or an element of one.
@@ -48,6 +49,11 @@ impl Members {
 
     /// The members in order.
     pub fn targets(&self) -> &[Target] {
+        &self.listed.1
+    }
+
+    /// The list itself.
+    pub fn listed(&self) -> &Arc<Vec<Target>> {
         &self.listed.1
     }
 
@@ -159,6 +165,29 @@ impl Graph {
         let members = Members::new(selector.clone(), hashes, targets);
         self.choices.selections.push(members);
         Selection(self.choices.selections.len() as u32 - 1)
+    }
+
+    /// Choices by their place in the program: slot by slot and pass by pass, from the outside in.
+    pub fn in_program_order(&self, targets: &[Target]) -> Vec<Target> {
+        let mut keyed: Vec<(SmallVec<[u64; 6]>, Target)> = targets
+            .iter()
+            .map(|t| {
+                let mut place = SmallVec::new();
+                let mut n = t.node;
+                while n != NONE {
+                    let frame = &self.frames[self.nodes[n as usize].frame as usize];
+                    place.push(u64::from(n - frame.base));
+                    // Entries of a `mem` have no order of their own.
+                    let entry = if matches!(frame.args, Arguments::Values(_)) { frame.path } else { 0 };
+                    place.extend([u64::from(frame.pass), entry]);
+                    n = frame.owner;
+                }
+                place.reverse();
+                (place, *t)
+            })
+            .collect();
+        keyed.sort_by(|a, b| a.0.cmp(&b.0).then(a.1.element.cmp(&b.1.element)));
+        keyed.into_iter().map(|(_, t)| t).collect()
     }
 
     /// What selections ask about a choice.

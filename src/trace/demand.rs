@@ -88,6 +88,11 @@ impl Graph {
     pub fn demand(&mut self, code: &Code, root: NodeId) -> Result<(), Failure> {
         let bottom = self.stack.len();
         self.stack.push(root);
+        self.run_stack(code, bottom)
+    }
+
+    /// Works off the stack of nodes that are needed, down to a height.
+    pub fn run_stack(&mut self, code: &Code, bottom: usize) -> Result<(), Failure> {
         while self.stack.len() > bottom {
             let n = self.stack[self.stack.len() - 1];
             match self.nodes[n as usize].state {
@@ -159,6 +164,9 @@ impl Graph {
 
     /// Replaces what a node holds besides its operands.
     pub fn set_deps(&mut self, n: NodeId, deps: Deps) {
+        if deps.is_empty() && self.nodes[n as usize].side.is_none() {
+            return;
+        }
         let held = self.nodes[n as usize].flags & HELD != 0;
         let old = match self.nodes[n as usize].side.as_deref() {
             Some(Side::Deps(old)) => old.clone(),
@@ -175,12 +183,12 @@ impl Graph {
         }
         match self.nodes[n as usize].side.as_deref_mut() {
             Some(Side::Choice(c)) => {
-                self.journal.push(Entry::Choice(n, c.clone()));
+                self.journal.push(Entry::Choice(n, Box::new(c.clone())));
                 c.deps = deps;
             }
             Some(Side::Total(t)) => {
-                self.journal.push(Entry::Total(n, t.clone()));
-                t.deps = deps;
+                let old = std::mem::replace(&mut t.deps, deps);
+                self.journal.push(Entry::TotalDeps(n, old));
             }
             _ => self.set_side(n, if deps.is_empty() { None } else { Some(Side::Deps(deps)) }),
         }
@@ -214,6 +222,11 @@ impl Graph {
                 }
             }
         }
+        self.run(code, n)
+    }
+
+    /// One attempt at the operation of a node.
+    pub fn run(&mut self, code: &Code, n: NodeId) -> Result<Step, Failure> {
         let step = self.evaluate(code, n)?;
         if let (Step::Done, Some(log)) = (&step, &mut self.watched) {
             let f = &self.frames[self.nodes[n as usize].frame as usize];

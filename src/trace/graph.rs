@@ -10,7 +10,7 @@ use super::propose::{Constraint, Draws, Pending};
 
 use crate::dist::Datum;
 use crate::lang::address::ROOT_HASH;
-use crate::lang::code::{BlockKind, Callee, Code, Op, Operand};
+use crate::lang::code::{BlockKind, Callee, Code, Op, Operand, SlotFacts};
 use crate::lang::error::{FaultKind, RunError};
 use crate::lang::key::Key;
 use crate::lang::value::Value;
@@ -150,7 +150,8 @@ impl Graph {
 
     /// Puts a frame and its nodes in storage, re-using what was freed.
     pub fn place_frame(&mut self, code: &Code, mut frame: Frame) -> FrameId {
-        let len = code.blocks[frame.block as usize].ops.len();
+        let block = &code.blocks[frame.block as usize];
+        let (len, first) = (block.len(), block.first);
         let id = self.free_frames.pop().unwrap_or(self.frames.len() as FrameId);
         frame.base = match self.free_bases[frame.block as usize].pop() {
             Some(base) => base,
@@ -160,8 +161,9 @@ impl Graph {
                 base
             }
         };
-        for n in &mut self.nodes[frame.base as usize..frame.base as usize + len] {
+        for (n, op) in self.nodes[frame.base as usize..frame.base as usize + len].iter_mut().zip(first..) {
             n.frame = id;
+            n.op = op;
         }
         if id as usize == self.frames.len() {
             self.frames.push(frame);
@@ -173,7 +175,7 @@ impl Graph {
 
     /// Makes a frame for `owner` as part of the current update, and queues its effects.
     pub fn make_frame(&mut self, code: &Code, frame: Frame) -> Result<FrameId, Box<RunError>> {
-        let len = code.blocks[frame.block as usize].ops.len();
+        let len = code.blocks[frame.block as usize].len();
         if frame.depth > self.limits.depth {
             return Err(self.fail(
                 code,
@@ -209,9 +211,15 @@ impl Graph {
     }
 
     /// The operation a node evaluates.
+    #[inline]
     pub fn op<'c>(&self, code: &'c Code, n: NodeId) -> &'c Op {
-        let f = &self.frames[self.nodes[n as usize].frame as usize];
-        &code.blocks[f.block as usize].ops[(n - f.base) as usize]
+        &code.ops[self.nodes[n as usize].op as usize]
+    }
+
+    /// What is known of a node's slot.
+    #[inline]
+    pub fn slot_facts<'c>(&self, code: &'c Code, n: NodeId) -> &'c SlotFacts {
+        &code.slots[self.nodes[n as usize].op as usize]
     }
 
     /// The node an operand of a frame's block refers to; `None` for constants.
@@ -219,14 +227,17 @@ impl Graph {
         match o {
             Operand::Const(_) => None,
             Operand::Local(slot) => Some(self.frames[frame as usize].base + slot),
-            Operand::Outer { up, slot } => {
-                let mut f = frame;
-                for _ in 0..up {
-                    f = self.frames[f as usize].parent;
-                }
-                Some(self.frames[f as usize].base + slot)
-            }
+            Operand::Outer { up, slot } => Some(self.outer(frame, up, slot)),
         }
+    }
+
+    /// The node in a slot of a frame further out.
+    fn outer(&self, frame: FrameId, up: u16, slot: u32) -> NodeId {
+        let mut f = frame;
+        for _ in 0..up {
+            f = self.frames[f as usize].parent;
+        }
+        self.frames[f as usize].base + slot
     }
 
     /// The value of an operand that is evaluated.
@@ -243,8 +254,7 @@ impl Graph {
     /// The operand in the caller's frame that feeds a parameter, with that frame.
     pub fn argument(&self, code: &Code, n: NodeId) -> Option<(FrameId, Operand)> {
         let frame = &self.frames[self.nodes[n as usize].frame as usize];
-        let slot = (n - frame.base) as usize;
-        let Op::Param { index, .. } = &code.blocks[frame.block as usize].ops[slot] else { return None };
+        let Op::Param { index, .. } = self.op(code, n) else { return None };
         let i = match &frame.args {
             Arguments::Positional(count) => (index < count).then_some(*index),
             Arguments::Mapped(map) => map.get(*index as usize).copied().flatten(),
@@ -259,14 +269,31 @@ impl Graph {
     /// Calls `f` with every node `n` holds, structure first, and whether the link is an outside one. The order matters: a
     /// change of an earlier one may make the later ones irrelevant.
     pub fn each_dep(&self, code: &Code, n: NodeId, mut f: impl FnMut(NodeId, bool)) {
+        let facts = self.slot_facts(code, n);
+        if let Some(reads) = &facts.reads {
+            for (up, slot) in reads {
+                match up {
+                    0 => f(n - facts.slot + slot, false),
+                    _ => f(self.outer(self.nodes[n as usize].frame, *up, *slot), true),
+                }
+            }
+        } else {
+            self.each_changing_dep(code, n, &mut f);
+        }
+        if self.nodes[n as usize].side.is_some() {
+            self.each_side_dep(code, n, f);
+        }
+    }
+
+    /// The operands that a node holds, where that depends on the state.
+    fn each_changing_dep(&self, code: &Code, n: NodeId, f: &mut impl FnMut(NodeId, bool)) {
         let frame = self.nodes[n as usize].frame;
-        let op = self.op(code, n);
         let mut operand = |o: Operand| {
             if let Some(d) = self.resolve(frame, o) {
                 f(d, !matches!(o, Operand::Local(_)));
             }
         };
-        match op {
+        match self.op(code, n) {
             Op::Param { default, .. } => match self.argument(code, n) {
                 Some((af, o)) => {
                     if let Some(d) = self.resolve(af, o) {
@@ -292,9 +319,8 @@ impl Graph {
                 operand(*over);
             }
             Op::Gather => f(n - 1, false),
-            other => other.operands(operand),
+            _ => {}
         }
-        self.each_side_dep(code, n, f);
     }
 
     /// The part of [`Graph::each_dep`] that is not operands.
@@ -341,28 +367,30 @@ impl Graph {
 
     /// Takes hold of a node.
     pub fn acquire(&mut self, dep: NodeId, user: NodeId, outside: bool) {
-        self.save(dep);
+        self.journal.push(Entry::Acquired(dep, outside));
         self.nodes[dep as usize].refs += 1;
         if outside {
-            let list = self.nodes[dep as usize].outside;
-            let list = if list == 0 {
-                let i = self.free_outside.pop().unwrap_or_else(|| {
-                    self.outside.push(Outside::default());
-                    self.outside.len() as u32 - 1
-                });
-                self.nodes[dep as usize].outside = i;
-                i
-            } else {
-                list
+            let list = match self.nodes[dep as usize].outside {
+                0 => self.new_outside(dep),
+                list => list,
             };
             self.outside[list as usize].users.push(user);
-            self.journal.push(Entry::OutsideAdded(dep));
         }
+    }
+
+    /// A list of users for a node that has had none.
+    fn new_outside(&mut self, n: NodeId) -> u32 {
+        let list = self.free_outside.pop().unwrap_or_else(|| {
+            self.outside.push(Outside::default());
+            self.outside.len() as u32 - 1
+        });
+        self.nodes[n as usize].outside = list;
+        list
     }
 
     /// Lets go of a node; what nothing holds any more is emptied at the end of the update.
     pub fn release(&mut self, dep: NodeId, outside: bool) {
-        self.save(dep);
+        self.journal.push(Entry::Released(dep, outside));
         let node = &mut self.nodes[dep as usize];
         node.refs -= 1;
         if node.refs == 0 {
@@ -374,7 +402,6 @@ impl Graph {
             if list.gone as usize * 2 > list.users.len() && list.gone > 8 {
                 self.untidy.push(dep);
             }
-            self.journal.push(Entry::OutsideGone(dep));
         }
     }
 

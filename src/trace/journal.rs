@@ -26,9 +26,10 @@ pub(crate) enum Entry {
     /// A node's side before it was replaced.
     Side(NodeId, Option<Box<Side>>),
     /// The content of a choice's side before it changed.
-    Choice(NodeId, ChoiceSide),
-    /// The total of an observed array before it changed.
-    Total(NodeId, Total),
+    Choice(NodeId, Box<ChoiceSide>),
+    /// The total of an observed array, or what it holds, before it changed.
+    Sum(NodeId, ExactSum),
+    TotalDeps(NodeId, Deps),
     /// A frame was made.
     FrameMade(FrameId),
     /// A frame was let go.
@@ -39,9 +40,9 @@ pub(crate) enum Entry {
     PassMoved(FrameId, u32),
     /// An entry of a `mem` function changed.
     Memo(NodeId, Key, Option<(FrameId, u32)>),
-    /// An outside user was added; one was marked as gone.
-    OutsideAdded(NodeId),
-    OutsideGone(NodeId),
+    /// A node was taken hold of or let go, from another frame or not.
+    Acquired(NodeId, bool),
+    Released(NodeId, bool),
     /// A choice was registered, or removed from the given places.
     ChoiceAdded(NodeId, u64),
     ChoiceRemoved(NodeId, u64),
@@ -131,12 +132,17 @@ impl Graph {
                 Entry::Side(n, side) => self.nodes[n as usize].side = side,
                 Entry::Choice(n, old) => {
                     if let Some(Side::Choice(c)) = self.nodes[n as usize].side.as_deref_mut() {
-                        *c = old;
+                        *c = *old;
                     }
                 }
-                Entry::Total(n, old) => {
+                Entry::Sum(n, old) => {
                     if let Some(Side::Total(t)) = self.nodes[n as usize].side.as_deref_mut() {
-                        *t = old;
+                        t.sum = old;
+                    }
+                }
+                Entry::TotalDeps(n, old) => {
+                    if let Some(Side::Total(t)) = self.nodes[n as usize].side.as_deref_mut() {
+                        t.deps = old;
                     }
                 }
                 Entry::FrameMade(f) => self.free_frame(code, f),
@@ -155,13 +161,19 @@ impl Graph {
                         };
                     }
                 }
-                Entry::OutsideAdded(n) => {
-                    let list = self.nodes[n as usize].outside;
-                    self.outside[list as usize].users.pop();
+                Entry::Acquired(n, outside) => {
+                    let node = &mut self.nodes[n as usize];
+                    node.refs -= 1;
+                    if outside {
+                        self.outside[node.outside as usize].users.pop();
+                    }
                 }
-                Entry::OutsideGone(n) => {
-                    let list = self.nodes[n as usize].outside;
-                    self.outside[list as usize].gone -= 1;
+                Entry::Released(n, outside) => {
+                    let node = &mut self.nodes[n as usize];
+                    node.refs += 1;
+                    if outside {
+                        self.outside[node.outside as usize].gone -= 1;
+                    }
                 }
                 Entry::ChoiceAdded(n, hash) => self.choices.undo_add(n, hash),
                 Entry::ChoiceRemoved(n, hash) => self.choices.undo_remove(n, hash),
@@ -191,7 +203,7 @@ impl Graph {
     /// Gives a frame's storage back.
     fn free_frame(&mut self, code: &Code, f: FrameId) {
         let (block, base) = (self.frames[f as usize].block as usize, self.frames[f as usize].base);
-        let end = base + code.blocks[block].ops.len() as u32;
+        let end = base + code.blocks[block].len() as u32;
         for n in base..end {
             let outside = self.nodes[n as usize].outside;
             if outside != 0 {

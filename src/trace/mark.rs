@@ -26,6 +26,20 @@ impl Graph {
         }
     }
 
+    /// Marks what reads a choice from other frames.
+    pub fn mark_outside_users(&mut self, code: &Code, n: NodeId) {
+        self.mark_each_outside(code, n);
+        self.mark_all(code);
+    }
+
+    fn mark_each_outside(&mut self, code: &Code, n: NodeId) {
+        let list = self.nodes[n as usize].outside as usize;
+        for i in 0..self.outside[list].users.len() {
+            let user = self.outside[list].users[i];
+            self.mark(code, user);
+        }
+    }
+
     /// Works off the stack of nodes whose users are to be marked.
     fn mark_all(&mut self, code: &Code) {
         while let Some(n) = self.stack.pop() {
@@ -35,22 +49,20 @@ impl Graph {
 
     /// Marks the users of a node; those that may pass a change on go to the stack.
     fn mark_users(&mut self, code: &Code, n: NodeId) {
-        let (frame, list) = (self.nodes[n as usize].frame as usize, self.nodes[n as usize].outside as usize);
-        let (block, base, owner) =
-            (self.frames[frame].block as usize, self.frames[frame].base, self.frames[frame].owner);
-        let slot = n - base;
-        let block = &code.blocks[block];
-        for user in &block.users[slot as usize] {
-            self.mark_static_user(code, n, base + user);
+        let facts = self.slot_facts(code, n);
+        for user in &facts.users {
+            self.mark_static_user(code, n, n - facts.slot + user);
         }
-        for i in 0..self.outside[list].users.len() {
-            let user = self.outside[list].users[i];
-            self.mark(code, user);
+        self.mark_each_outside(code, n);
+        if !facts.is_result {
+            return;
         }
-        if block.result == Some(Operand::Local(slot)) && owner != NONE {
+        let frame = self.nodes[n as usize].frame;
+        let owner = self.frames[frame as usize].owner;
+        if owner != NONE {
             match self.op(code, owner) {
                 Op::Call { .. } | Op::If { .. } => self.mark(code, owner),
-                Op::Fold { .. } => self.mark_next_pass(code, owner, frame as FrameId),
+                Op::Fold { .. } => self.mark_next_pass(code, owner, frame),
                 _ => {}
             }
         }
@@ -171,14 +183,11 @@ impl Graph {
 
     fn make_stale(&mut self, code: &Code, n: NodeId) {
         self.save(n);
-        let node = &mut self.nodes[n as usize];
-        node.state = State::Stale;
-        let frame = &self.frames[node.frame as usize];
-        let slot = (n - frame.base) as usize;
-        let block = &code.blocks[frame.block as usize];
-        if block.is_effect[slot] {
+        self.nodes[n as usize].state = State::Stale;
+        let facts = self.slot_facts(code, n);
+        if facts.is_effect {
             self.stale_effects.push(n);
-        } else if matches!(block.ops[slot], Op::Draw { .. }) {
+        } else if facts.is_draw {
             self.stale_choices.push(n);
         }
     }

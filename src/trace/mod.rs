@@ -16,6 +16,7 @@ mod path;
 mod propose;
 mod save;
 mod select;
+mod spread;
 
 pub use crate::lang::address::{Address, AddressSegment};
 pub use choices::{Selection, Target};
@@ -117,8 +118,17 @@ impl Trace {
         let before = self.graph.begin();
         self.graph.draws = draws;
         self.graph.constraints.extend(constraints.iter().cloned());
-        self.graph.queue(&self.code, changes);
-        let settled = self.graph.settle(&self.code);
+        let spread = match changes {
+            [(target, change)] => self.graph.spread_of(&self.code, *target).map(|s| (*target, change, s)),
+            _ => None,
+        };
+        let settled = match spread {
+            Some((target, change, spread)) => self.graph.update_by_spread(&self.code, target, change, spread),
+            None => {
+                self.graph.queue(&self.code, changes);
+                self.graph.settle(&self.code)
+            }
+        };
         self.graph.constraints.clear();
         match settled {
             Ok(()) => {
@@ -242,6 +252,16 @@ impl Trace {
     /// The choices a selection now has.
     pub fn targets(&self, selection: Selection) -> &[Target] {
         self.graph.choices.selections[selection.0 as usize].targets()
+    }
+
+    /// The choices a selection now has, as kept: another list as soon as they change.
+    pub(crate) fn listed(&self, selection: Selection) -> &Arc<Vec<Target>> {
+        self.graph.choices.selections[selection.0 as usize].listed()
+    }
+
+    /// The choices a selection now has, in the order of the program: by place in the text and pass of the loops around.
+    pub fn in_program_order(&self, selection: Selection) -> Vec<Target> {
+        self.graph.in_program_order(self.targets(selection))
     }
 
     /// The choice at an address, if it is active. An element of a choice has the element's index as last key.

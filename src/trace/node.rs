@@ -61,6 +61,8 @@ pub(crate) struct Node {
     pub touched: u32,
     /// Its frame.
     pub frame: FrameId,
+    /// Its operation, by index in [`crate::lang::code::Code::ops`].
+    pub op: u32,
     /// Its list of users in other frames.
     pub outside: u32,
     /// How far its value can be trusted.

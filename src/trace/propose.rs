@@ -104,15 +104,15 @@ impl Graph {
 
     /// What the current update did to the score.
     pub fn weight(&self, prior: &ExactSum, likelihood: &ExactSum) -> Weight {
-        let mut old = prior.clone();
-        old.merge(likelihood);
-        let mut new = self.prior.clone();
-        new.merge(&self.likelihood);
-        let log_joint = ExactSum::difference(&new, &old);
-        new.unmerge(&self.drawn);
-        old.unmerge(&self.undrawn);
+        let none = ExactSum::default();
+        let log_joint =
+            ExactSum::balance([&self.prior, &self.likelihood, &none], [prior, likelihood, &none]);
+        let log_weight = ExactSum::balance(
+            [&self.prior, &self.likelihood, &self.drawn],
+            [prior, likelihood, &self.undrawn],
+        );
         Weight {
-            log_weight: ExactSum::difference(&new, &old),
+            log_weight,
             log_joint,
             log_likelihood: ExactSum::difference(&self.likelihood, likelihood),
             log_jacobian: self.jacobian,

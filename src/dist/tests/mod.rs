@@ -57,7 +57,7 @@ fn try_make(family: &str, p: &[f64]) -> Result<Dist, ParamError> {
         "uniform_discrete" => Dist::UniformDiscrete(UniformDiscrete::new(p[0], p[1])?),
         "binomial" => Dist::Binomial(Binomial::new(p[0], p[1])?),
         "poisson" => Dist::Poisson(Poisson::new(p[0])?),
-        "categorical" => Dist::Categorical(Arc::new(Categorical::new(p)?)),
+        "categorical" => Dist::Categorical(Categorical::new(p)?),
         "dirichlet" => Dist::Dirichlet(Arc::new(Dirichlet::new(p)?)),
         other => panic!("no family {other}"),
     })

@@ -24,7 +24,7 @@ impl Kernel for Block {
 
     fn step(&mut self, trace: &mut Trace, at: &At) -> TraceResult<Outcome> {
         let mut rng = at.stream();
-        let (targets, ways) = self.scope.members(trace, &mut rng);
+        let (targets, ways) = self.scope.members(trace, at, &mut rng);
         if targets.is_empty() {
             return Ok(Outcome::default());
         }

@@ -6,7 +6,7 @@
 //! another of its values, an unbounded integer by a few units.
 
 use crate::dist::{Datum, Support};
-use crate::infer::kernel::{At, Kernel, Outcome, Registered, Scope, decide, recoverable};
+use crate::infer::kernel::{At, Kernel, Outcome, Pick, Registered, Scope, decide, recoverable};
 use crate::rng::Stream;
 use crate::trace::{Change, Target, Trace, TraceResult};
 use rustc_hash::FxHashMap;
@@ -117,7 +117,7 @@ impl Drift {
     }
 
     fn key(&self, trace: &Trace, targets: &[Target]) -> u64 {
-        if self.scope.scope.one { trace.address_hash(targets[0]) } else { 0 }
+        if self.scope.scope.pick != Pick::All { trace.address_hash(targets[0]) } else { 0 }
     }
 
     fn adapt(&mut self, key: u64, accepted: bool, dimensions: usize) {
@@ -158,9 +158,13 @@ impl Kernel for Drift {
         "drift".into()
     }
 
+    fn sweep(&mut self, trace: &mut Trace) -> Option<usize> {
+        self.scope.sweep(trace)
+    }
+
     fn step(&mut self, trace: &mut Trace, at: &At) -> TraceResult<Outcome> {
         let mut rng = at.stream();
-        let (targets, ways) = self.scope.members(trace, &mut rng);
+        let (targets, ways) = self.scope.members(trace, at, &mut rng);
         if targets.is_empty() {
             return Ok(Outcome::default());
         }

@@ -44,7 +44,7 @@ impl Kernel for Elliptical {
 
     fn step(&mut self, trace: &mut Trace, at: &At) -> TraceResult<Outcome> {
         let mut rng = at.stream();
-        let (targets, _) = self.scope.members(trace, &mut rng);
+        let (targets, _) = self.scope.members(trace, at, &mut rng);
         if targets.is_empty() {
             return Ok(Outcome::default());
         }

@@ -15,54 +15,61 @@ use crate::trace::{Change, Target, Trace, TraceResult};
 #[derive(Clone, Debug)]
 pub struct Gibbs {
     scope: Registered,
+    /// The values of the choice and their log weights, kept from step to step so that nothing is allocated.
+    values: Vec<Datum>,
+    log: Vec<f64>,
 }
 
-/// The log weights of a choice's values relative to the state, and whether any of them changes the set of choices.
-struct Weights {
-    log: Vec<f64>,
+/// What weighing the values of a choice showed.
+#[derive(Clone, Copy, Debug, Default)]
+struct Weighed {
+    /// Whether any of them changes the set of choices.
     structural: bool,
     failed: u32,
+    /// The value whose proposal is pending.
+    pending: Option<usize>,
 }
 
 impl Gibbs {
     /// The kernel for one of these choices at a time.
     pub fn new(scope: Scope) -> Self {
-        Gibbs { scope: Registered::new(Scope { one: true, ..scope }) }
+        Gibbs { scope: Registered::new(scope.single()), values: Vec::new(), log: Vec::new() }
     }
 
-    /// The weights of all values. The lane of value `i` is `first_lane + i`.
-    fn weights(
+    /// The log weights of all values relative to the state, which has value `current`; picking the choice there costs `ways`.
+    /// The lane of value `i` is `first_lane + i`.
+    fn weigh(
         &mut self,
         trace: &mut Trace,
         at: &At,
         target: Target,
-        values: &[Datum],
-        n: usize,
+        ways: f64,
+        current: usize,
         first_lane: u64,
-    ) -> TraceResult<Weights> {
-        let mut weights = Weights { log: Vec::with_capacity(values.len()), structural: false, failed: 0 };
-        let current = trace.stored(target);
-        for (i, v) in values.iter().enumerate() {
-            if Some(v) == current.as_ref() {
-                weights.log.push(0.0);
+    ) -> TraceResult<Weighed> {
+        let mut weighed = Weighed::default();
+        self.log.clear();
+        for (i, v) in self.values.iter().enumerate() {
+            if i == current {
+                self.log.push(0.0);
                 continue;
             }
             let change = [(target, Change::Set(v.clone()))];
             match recoverable(trace.propose(&change, at.draws(first_lane + i as u64)))? {
                 Some(w) => {
-                    let ways = libm::log(n as f64) - self.scope.ways_back(trace);
-                    let log = at.tempered(&w) + ways;
-                    weights.log.push(if log.is_nan() { f64::NEG_INFINITY } else { log });
-                    weights.structural |= w.appeared > 0 || w.vanished > 0;
+                    let log = at.tempered(&w) + ways - self.scope.ways_back(trace);
+                    self.log.push(if log.is_nan() { f64::NEG_INFINITY } else { log });
+                    weighed.structural |= w.appeared > 0 || w.vanished > 0;
+                    weighed.pending = Some(i);
                 }
                 None => {
-                    weights.log.push(f64::NEG_INFINITY);
-                    weights.failed += 1;
+                    self.log.push(f64::NEG_INFINITY);
+                    weighed.failed += 1;
+                    weighed.pending = None;
                 }
             }
         }
-        trace.rollback();
-        Ok(weights)
+        Ok(weighed)
     }
 }
 
@@ -71,42 +78,51 @@ impl Kernel for Gibbs {
         "gibbs".into()
     }
 
+    fn sweep(&mut self, trace: &mut Trace) -> Option<usize> {
+        self.scope.sweep(trace)
+    }
+
     fn step(&mut self, trace: &mut Trace, at: &At) -> TraceResult<Outcome> {
         let mut rng = at.stream();
-        let Some((target, n)) = self.scope.pick(trace, &mut rng) else { return Ok(Outcome::default()) };
-        let Some(values) = trace.dist(target).and_then(|d| d.support().finite_values()) else {
+        let Some((target, n)) = self.scope.pick(trace, at, &mut rng) else { return Ok(Outcome::default()) };
+        let stored = trace.stored(target);
+        if !trace.dist(target).is_some_and(|d| d.support().list_values(&mut self.values)) {
+            return Ok(Outcome::default());
+        }
+        let Some(old) = self.values.iter().position(|v| Some(v) == stored.as_ref()) else {
             return Ok(Outcome::default());
         };
-        let before = trace.stored(target);
-        let forward = self.weights(trace, at, target, &values, n, 0)?;
-        let chosen = sample_log(&forward.log, &mut rng);
+        let forward = self.weigh(trace, at, target, libm::log(n as f64), old, 0)?;
+        let chosen = sample_log(&self.log, &mut rng);
         let mut outcome = Outcome { proposals: 1, failed: forward.failed, ..Default::default() };
-        if Some(&values[chosen]) == before.as_ref() {
+        if chosen == old {
+            trace.rollback();
             return Ok(outcome);
         }
-        let change = [(target, Change::Set(values[chosen].clone()))];
-        // The same lane: the same draws as when it was weighed.
-        let Some(w) = recoverable(trace.propose(&change, at.draws(chosen as u64)))? else { return Ok(outcome) };
-        if !forward.structural && w.appeared == 0 && w.vanished == 0 {
+        if forward.pending != Some(chosen) {
+            let change = [(target, Change::Set(self.values[chosen].clone()))];
+            // The same lane: the same draws as when it was weighed.
+            if recoverable(trace.propose(&change, at.draws(chosen as u64)))?.is_none() {
+                return Ok(outcome);
+            }
+        }
+        if !forward.structural {
             trace.commit();
             outcome.accepted = 1;
             return Ok(outcome);
         }
+        let (forth, log_forward) = (self.log[chosen], log_sum_exp(&self.log));
         let removed = trace.removed();
         trace.commit();
-        let selection = self.scope.selection(trace);
-        let n_after = trace.targets(selection).len();
-        let lanes = values.len() as u64;
-        let backward = self.weights(trace, at, target, &values, n_after, lanes)?;
-        let Some(old) = before.and_then(|b| values.iter().position(|v| *v == b)) else { return Ok(outcome) };
+        let ways = self.scope.ways_back(trace);
+        self.weigh(trace, at, target, ways, chosen, self.values.len() as u64)?;
+        trace.rollback();
         // The old state itself stands for the old value: its weight back is minus its weight forth.
-        let mut back = backward.log;
-        back[old] = -forward.log[chosen];
-        let ratio = log_sum_exp(&forward.log) - forward.log[chosen] - log_sum_exp(&back);
-        if accepts(ratio, &mut rng) {
+        self.log[old] = -forth;
+        if accepts(log_forward - forth - log_sum_exp(&self.log), &mut rng) {
             outcome.accepted = 1;
         } else {
-            let undo = [(target, Change::Set(values[old].clone()))];
+            let undo = [(target, Change::Set(self.values[old].clone()))];
             trace.propose_constrained(&undo, &removed, at.draws(0))?;
             trace.commit();
         }

@@ -12,7 +12,7 @@ pub struct Mh {
 impl Mh {
     /// The kernel for one of these choices at a time.
     pub fn new(scope: Scope) -> Self {
-        Mh { scope: Registered::new(Scope { one: true, ..scope }) }
+        Mh { scope: Registered::new(scope.single()) }
     }
 }
 
@@ -21,9 +21,13 @@ impl Kernel for Mh {
         "mh".into()
     }
 
+    fn sweep(&mut self, trace: &mut Trace) -> Option<usize> {
+        self.scope.sweep(trace)
+    }
+
     fn step(&mut self, trace: &mut Trace, at: &At) -> TraceResult<Outcome> {
         let mut rng = at.stream();
-        let Some((target, n)) = self.scope.pick(trace, &mut rng) else { return Ok(Outcome::default()) };
+        let Some((target, n)) = self.scope.pick(trace, at, &mut rng) else { return Ok(Outcome::default()) };
         let proposed = trace.propose(&[(target, Change::Resample)], at.draws(0));
         let Some(weight) = recoverable(proposed)? else { return Ok(Outcome::failed()) };
         let ratio = at.tempered(&weight) + libm::log(n as f64) - self.scope.ways_back(trace);

@@ -101,7 +101,7 @@ impl Kernel for Slice {
 
     fn step(&mut self, trace: &mut Trace, at: &At) -> TraceResult<Outcome> {
         let mut rng = at.stream();
-        let (targets, _) = self.scope.members(trace, &mut rng);
+        let (targets, _) = self.scope.members(trace, at, &mut rng);
         let mut outcome = Outcome::default();
         for target in targets {
             let mut coordinate = 0;

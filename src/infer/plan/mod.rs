@@ -229,7 +229,8 @@ pub(super) fn argument<'a>(args: &'a [crate::syntax::ast::Arg], place: usize, na
 
 impl Runner<'_> {
     fn at(&self) -> At {
-        At { seed: self.options.seed, chain: self.chain, step: self.step, adapting: self.in_warmup, power: self.power }
+        let at = At::new(self.options.seed, self.chain, self.step);
+        At { adapting: self.in_warmup, power: self.power, ..at }
     }
 
     fn predictive(&self) -> Draws {

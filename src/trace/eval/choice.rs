@@ -23,16 +23,21 @@ impl Graph {
         keys: &[Operand],
     ) -> Result<Step, Failure> {
         let frame = self.nodes[n as usize].frame;
-        if let Some(step) = self.await_plain(code, n, frame, spec.operands())? {
-            return Ok(step);
-        }
+        let mut deps = Deps::new();
+        let dist = match self.dist_now(code, n, frame, spec, &mut deps) {
+            Ok(dist) => dist?,
+            Err(m) => return self.need(code, m),
+        };
         if let Some(step) = self.await_all(code, frame, keys)? {
             return Ok(step);
         }
-        let mut deps = Deps::new();
-        let dist = self.make_dist(code, n, frame, spec, &mut deps)?;
-        let own = if keys.is_empty() { None } else { Some(self.own_keyed(code, n, frame, site, keys)?) };
-        if self.nodes[n as usize].flags & WAS_STALE != 0 {
+        let stale = self.nodes[n as usize].flags & WAS_STALE != 0;
+        let own = match keys {
+            [] => None,
+            _ if stale && !self.any_changed(frame, keys) => self.own_hash(n),
+            _ => Some(self.own_keyed(code, n, frame, site, keys)?),
+        };
+        if stale {
             let moved = own.is_some_and(|h| self.choice_hash(code, n) != h);
             if !moved && self.update_choice(code, n, &dist)? {
                 self.set_deps(n, deps);
@@ -57,7 +62,21 @@ impl Graph {
         Ok(self.settle_node(code, n))
     }
 
-    /// Makes the distribution of a draw or observation.
+    /// Whether one of these operands changed in this update.
+    fn any_changed(&self, frame: FrameId, operands: &[Operand]) -> bool {
+        let changed = |o: &Operand| self.resolve(frame, *o).is_some_and(|d| self.nodes[d as usize].changed == self.epoch);
+        operands.iter().any(changed)
+    }
+
+    /// The hash that a keyed choice is known by.
+    fn own_hash(&self, n: NodeId) -> Option<u64> {
+        match self.nodes[n as usize].side.as_deref() {
+            Some(Side::Choice(c)) => c.hash,
+            _ => None,
+        }
+    }
+
+    /// The distribution of a draw or observation whose parameters are evaluated.
     pub(crate) fn make_dist(
         &self,
         code: &Code,
@@ -66,16 +85,31 @@ impl Graph {
         spec: &DistSpec,
         deps: &mut Deps,
     ) -> Result<Dist, Failure> {
+        match self.dist_now(code, n, frame, spec, deps) {
+            Ok(dist) => dist,
+            Err(_) => Err(self.type_error(code, n, "its parameters are not evaluated".into())),
+        }
+    }
+
+    /// Makes the distribution of a draw or observation, or tells the node to wait for.
+    pub(crate) fn dist_now(
+        &self,
+        code: &Code,
+        n: NodeId,
+        frame: FrameId,
+        spec: &DistSpec,
+        deps: &mut Deps,
+    ) -> Result<Result<Dist, Failure>, NodeId> {
+        let values = self.inputs(code, frame, spec.operands(), deps)?;
         let made = match spec {
-            DistSpec::Family { builtin, args } => {
+            DistSpec::Family { builtin, .. } => {
                 let builtin = code.builtins.get(*builtin);
-                let values: SmallVec<[&Value; 8]> = args.iter().map(|a| self.plain(code, frame, *a, deps)).collect();
                 match builtin.kind {
                     Kind::Distribution(make) => make(&Args { builtin, values: &values }),
                     _ => Err(Fault::type_error(format!("`{}` is not a distribution", builtin.name))),
                 }
             }
-            DistSpec::Value(o) => match self.value(code, frame, *o) {
+            DistSpec::Value(_) => match values[0] {
                 Value::Dist(d) => Ok(Dist::clone(d)),
                 Value::Likelihood(l) => {
                     let message = format!("`{}` is a likelihood: it can be observed, it has no sampler", l.name());
@@ -85,7 +119,7 @@ impl Graph {
                     .with_hint("write `=` to bind a value")),
             },
         };
-        made.map_err(|f| self.fault(code, n, f))
+        Ok(made.map_err(|f| self.fault(code, n, f)))
     }
 
     fn own_keyed(&self, code: &Code, n: NodeId, frame: FrameId, site: u32, keys: &[Operand]) -> Result<u64, Failure> {
@@ -270,7 +304,7 @@ impl Graph {
         if let (Some(new), true) = (new, whitened)
             && let Some(Side::Choice(c)) = self.nodes[n as usize].side.as_deref_mut()
         {
-            self.journal.push(Entry::Choice(n, c.clone()));
+            self.journal.push(Entry::Choice(n, Box::new(c.clone())));
             c.stored = Some(new);
         }
         Ok(true)
@@ -319,7 +353,7 @@ impl Graph {
         let scores: Vec<f64> = xs.iter().enumerate().map(|(i, x)| dist.element_log_density(i, x)).collect();
         side.scores.iter().for_each(|s| self.prior.sub(*s));
         scores.iter().for_each(|s| self.prior.add(*s));
-        self.journal.push(Entry::Choice(n, side));
+        self.journal.push(Entry::Choice(n, Box::new(side)));
         if let Some(Side::Choice(c)) = self.nodes[n as usize].side.as_deref_mut() {
             c.scores = scores;
         }

@@ -293,13 +293,20 @@ impl Graph {
         if let Some(step) = self.await_all(code, frame, &[base])? {
             return Ok(step);
         }
-        if let Some(step) = self.await_plain(code, n, frame, keys)? {
-            return Ok(step);
+        let mut deps = Deps::new();
+        let mut rest: SmallVec<[Value; 2]> = SmallVec::new();
+        let read = self.inputs(code, frame, keys, &mut deps);
+        if let Err(m) = read.map(|values| values.iter().for_each(|v| rest.push(Value::clone(v)))) {
+            return self.need(code, m);
+        }
+        if let Some(m) = self.element_read_before(code, n, base, keys) {
+            if self.nodes[m as usize].state != State::Clean {
+                return self.need(code, m);
+            }
+            let value = self.nodes[m as usize].value.clone();
+            return Ok(self.finish(code, n, value));
         }
         let mut value = self.value(code, frame, base).clone();
-        let mut deps = Deps::new();
-        let mut rest: SmallVec<[Value; 2]> =
-            keys.iter().map(|k| self.plain(code, frame, *k, &mut deps).clone()).collect();
         while !rest.is_empty() {
             if let Value::Container(r) = value {
                 let container = r.node;
@@ -348,6 +355,20 @@ impl Graph {
         }
         self.set_deps(n, deps);
         Ok(self.finish(code, n, value))
+    }
+
+    /// The element of a container that a node read before, if container and keys are what they were.
+    fn element_read_before(&self, code: &Code, n: NodeId, base: Operand, keys: &[Operand]) -> Option<NodeId> {
+        let node = &self.nodes[n as usize];
+        let Value::Container(r) = self.value(code, node.frame, base) else { return None };
+        let Some(Side::Deps(deps)) = node.side.as_deref() else { return None };
+        let as_it_was = |d: NodeId| {
+            let d = &self.nodes[d as usize];
+            d.state == State::Clean && d.changed != self.epoch
+        };
+        let all = keys.iter().chain([&base]).filter_map(|o| self.resolve(node.frame, *o));
+        let same = node.flags & WAS_STALE != 0 && as_it_was(r.node) && all.into_iter().all(as_it_was);
+        (same && deps.len() == 1 && deps[0] != r.node + 1).then(|| deps[0])
     }
 
     /// How many keys an element of a container has.

@@ -72,7 +72,7 @@ impl Graph {
         };
         let keys = keys.map_err(|e| self.fault(code, n, e))?;
         self.set_loop(code, n, keys, items, body, frame, deps)?;
-        if code.blocks[self.frames[frame as usize].block as usize].is_effect[self.slot(n) as usize] {
+        if self.slot_facts(code, n).is_effect {
             self.make_all_passes(code, n)?;
         }
         Ok(self.finish_structure(code, n))
@@ -127,7 +127,7 @@ impl Graph {
         };
         self.check_callback(code, n, "map", block, 1)?;
         self.set_loop(code, n, keys, items, block, parent, deps)?;
-        if self.is_effect(code, n) {
+        if self.slot_facts(code, n).is_effect {
             self.make_all_passes(code, n)?;
         }
         Ok(self.finish_structure(code, n))
@@ -198,11 +198,6 @@ impl Graph {
             self.set_side(n, Some(Side::Loop(l)));
         }
         Ok(self.finish(code, n, value))
-    }
-
-    fn is_effect(&self, code: &Code, n: NodeId) -> bool {
-        let f = &self.frames[self.nodes[n as usize].frame as usize];
-        code.blocks[f.block as usize].is_effect[(n - f.base) as usize]
     }
 
     fn check_callback(&self, code: &Code, n: NodeId, what: &str, block: u32, takes: usize) -> Result<(), Failure> {

@@ -24,17 +24,11 @@ impl Graph {
             Op::Item => self.evaluate_item(code, n),
             Op::Accumulator => self.evaluate_accumulator(code, n),
             Op::Prim { builtin, args } => {
-                if let Some(step) = self.await_plain(code, n, frame, args)? {
-                    return Ok(step);
-                }
                 let builtin = code.builtins.get(*builtin);
                 let mut deps = Deps::new();
-                let value = {
-                    let mut values: SmallVec<[&Value; 8]> = SmallVec::new();
-                    for a in args {
-                        values.push(self.plain(code, frame, *a, &mut deps));
-                    }
-                    apply(builtin, &values)
+                let value = match self.inputs(code, frame, args, &mut deps).map(|values| apply(builtin, &values)) {
+                    Ok(value) => value,
+                    Err(m) => return self.need(code, m),
                 };
                 let value = value.map_err(|e| self.fault(code, n, e))?;
                 self.set_deps(n, deps);
@@ -120,6 +114,41 @@ impl Graph {
             }
         }
         Ok(None)
+    }
+
+    /// The values of operands, containers read as arrays or records, or the node to wait for before they can be read.
+    pub(crate) fn inputs<'a>(
+        &'a self,
+        code: &'a Code,
+        frame: FrameId,
+        operands: &[Operand],
+        deps: &mut Deps,
+    ) -> Result<SmallVec<[&'a Value; 4]>, NodeId> {
+        let mut values = SmallVec::new();
+        for o in operands {
+            let value = match self.resolve(frame, *o) {
+                None => self.value(code, frame, *o),
+                Some(m) => {
+                    let node = &self.nodes[m as usize];
+                    if node.state != State::Clean {
+                        return Err(m);
+                    }
+                    &node.value
+                }
+            };
+            values.push(match value {
+                Value::Container(r) => {
+                    let gather = &self.nodes[r.node as usize + 1];
+                    if gather.state != State::Clean {
+                        return Err(r.node + 1);
+                    }
+                    deps.push(r.node + 1);
+                    &gather.value
+                }
+                v => v,
+            });
+        }
+        Ok(values)
     }
 
     /// The value of an operand with a container read as an array or record; what was read for that goes to `deps`.

@@ -25,14 +25,11 @@ impl Graph {
         value: Operand,
     ) -> Result<Step, Failure> {
         let frame = self.nodes[n as usize].frame;
-        if let Some(step) = self.await_plain(code, n, frame, spec.operands())? {
-            return Ok(step);
-        }
-        if let Some(step) = self.await_plain(code, n, frame, &[value])? {
-            return Ok(step);
-        }
         let mut deps = Deps::new();
-        let score = self.observation_score(code, n, frame, spec, value, &mut deps)?;
+        let score = match self.observation_score(code, n, frame, spec, value, &mut deps) {
+            Ok(score) => score?,
+            Err(m) => return self.need(code, m),
+        };
         let stale = self.nodes[n as usize].flags & WAS_STALE != 0;
         if stale {
             self.retire_score(n);
@@ -59,14 +56,14 @@ impl Graph {
     fn set_total(&mut self, n: NodeId, sum: ExactSum) {
         match self.nodes[n as usize].side.as_deref_mut() {
             Some(Side::Total(t)) => {
-                self.journal.push(Entry::Total(n, t.clone()));
-                t.sum = sum;
+                let old = std::mem::replace(&mut t.sum, sum);
+                self.journal.push(Entry::Sum(n, old));
             }
             _ => self.set_side(n, Some(Side::Total(Total { sum, deps: Deps::new() }))),
         }
     }
 
-    /// Scores an observation, or its surrogate.
+    /// Scores an observation, or tells the node to wait for.
     fn observation_score(
         &self,
         code: &Code,
@@ -75,23 +72,27 @@ impl Graph {
         spec: &DistSpec,
         value: Operand,
         deps: &mut Deps,
-    ) -> Result<Score, Failure> {
-        if let DistSpec::Value(o) = spec {
-            match self.value(code, frame, *o) {
+    ) -> Result<Result<Score, Failure>, NodeId> {
+        if let DistSpec::Value(_) = spec {
+            match self.inputs(code, frame, spec.operands(), deps)?[0] {
                 Value::Dist(_) => {}
                 v @ Value::Likelihood(_) => {
-                    let observed = self.plain(code, frame, value, deps);
-                    return likelihood_score(v, observed).map(Score::One).map_err(|f| self.fault(code, n, f));
+                    let observed = self.inputs(code, frame, &[value], deps)?[0];
+                    let score = likelihood_score(v, observed).map(Score::One);
+                    return Ok(score.map_err(|f| self.fault(code, n, f)));
                 }
                 v => {
                     let message = format!("`observe` needs a distribution or likelihood, got {}", v.type_name());
-                    return Err(self.type_error(code, n, message));
+                    return Ok(Err(self.type_error(code, n, message)));
                 }
             }
         }
-        let dist = self.make_dist(code, n, frame, spec, deps)?;
-        let observed = self.plain(code, frame, value, deps);
-        score_value(&dist, observed).map_err(|f| self.fault(code, n, f))
+        let dist = match self.dist_now(code, n, frame, spec, deps)? {
+            Ok(dist) => dist,
+            Err(e) => return Ok(Err(e)),
+        };
+        let observed = self.inputs(code, frame, &[value], deps)?[0];
+        Ok(score_value(&dist, observed).map_err(|f| self.fault(code, n, f)))
     }
 
     /// The log density of an observation's coarse surrogate: never part of the joint.

@@ -135,7 +135,7 @@ impl Kernel for Nuts {
 
     fn step(&mut self, trace: &mut Trace, at: &At) -> TraceResult<Outcome> {
         let mut rng = at.stream();
-        let (targets, _) = self.scope.members(trace, &mut rng);
+        let (targets, _) = self.scope.members(trace, at, &mut rng);
         let Some((mut system, here)) = System::begin(trace, at, &targets)? else { return Ok(Outcome::default()) };
         let step = self.adaptation.step(&mut system, &here, at.adapting, &mut rng)?;
         let mass = self.adaptation.inverse_mass.clone();

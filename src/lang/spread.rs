@@ -1,0 +1,58 @@
+//! How the change of a choice spreads within its block, found once for all frames.
+//!
+//! Most choices feed a few computations and observations beside them. Where no operation on the way makes structure (calls,
+//! branches with frames, loops), what depends on the choice is the same list in every state, and an update can go through it
+//! in order instead of marking and asking.
+
+use super::code::{DistSpec, Op, Operand, Slot, SlotFacts, Spread};
+
+/// The longest list worth keeping.
+const LONGEST: usize = 64;
+
+/// The spread of the choice in slot `from` of a block, if it is the same in every state.
+pub(super) fn spread(ops: &[Op], slots: &[SlotFacts], from: Slot) -> Option<Spread> {
+    let mut reached = vec![false; slots.len()];
+    let mut order = Vec::new();
+    visit(ops, slots, from, &mut reached, &mut order)?;
+    order.pop();
+    order.reverse();
+    let local = |s: &Slot| match &ops[*s as usize] {
+        Op::Select { then, otherwise, .. } => ![then, otherwise].iter().any(|o| matches!(o, Operand::Outer { .. })),
+        _ => slots[*s as usize].reads.as_ref().is_some_and(|reads| reads.iter().all(|(up, _)| *up == 0)),
+    };
+    let is_closed = order.iter().all(local);
+    Some(Spread { slots: order.into(), is_closed })
+}
+
+/// Depth first: users before what they read, so that the reverse is an order of evaluation.
+fn visit(ops: &[Op], slots: &[SlotFacts], slot: Slot, reached: &mut [bool], order: &mut Vec<Slot>) -> Option<()> {
+    reached[slot as usize] = true;
+    if slots[slot as usize].is_result {
+        return None;
+    }
+    for user in &slots[slot as usize].users {
+        if reached[*user as usize] {
+            continue;
+        }
+        match &ops[*user as usize] {
+            Op::Prim { .. } | Op::Array(_) | Op::Record { .. } | Op::Index { .. } | Op::Select { .. } => {
+                visit(ops, slots, *user, reached, order)?;
+            }
+            Op::Observe { coarse: None, .. } | Op::Factor { .. } => {
+                reached[*user as usize] = true;
+                order.push(*user);
+            }
+            // A choice keeps its value when its parameters change, unless it is of a form that is seen only when it runs.
+            Op::Draw { dist: DistSpec::Family { .. }, keys, .. } if keys.is_empty() => {
+                reached[*user as usize] = true;
+                order.push(*user);
+            }
+            _ => return None,
+        }
+        if order.len() > LONGEST {
+            return None;
+        }
+    }
+    order.push(slot);
+    Some(())
+}

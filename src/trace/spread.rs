@@ -1,0 +1,97 @@
+//! Updates of one choice whose change spreads through its own frame in a known order (see [`crate::lang::code::Spread`]).
+//!
+//! The general way marks all that may change and asks for it; here the list is known, so each entry runs at once if
+//! something it reads has changed. What is outside of the frame is marked afterwards and runs the general way. Both ways
+//! give the same values and the same exact sums.
+
+use super::choices::Target;
+use super::demand::{Failure, Step};
+use super::graph::Graph;
+use super::node::*;
+use super::propose::{Change, Pending};
+use crate::lang::code::{Code, Spread};
+use crate::lang::value::Value;
+
+impl Graph {
+    /// How the change of a choice spreads, if it can be updated this way in this state.
+    pub fn spread_of<'c>(&self, code: &'c Code, target: Target) -> Option<&'c Spread> {
+        let facts = self.slot_facts(code, target.node);
+        let spread = facts.spread.as_ref()?;
+        if !self.incremental || self.nodes[target.node as usize].state != State::Clean {
+            return None;
+        }
+        let mut leaves = self.is_read_outside(target.node);
+        for slot in &spread.slots {
+            let m = target.node - facts.slot + slot;
+            leaves |= self.is_read_outside(m);
+            let node = &self.nodes[m as usize];
+            // A choice whose value may follow its parameters.
+            let plain = matches!(node.value, Value::Num(_) | Value::Bool(_)) && node.side.is_none();
+            if node.state == State::Clean && self.slot_facts(code, m).is_draw && !plain {
+                return None;
+            }
+        }
+        // What is outside may come back to what reads from there: then only the general way has the right order.
+        (spread.is_closed || !leaves).then_some(spread)
+    }
+
+    fn is_read_outside(&self, n: NodeId) -> bool {
+        let users = &self.outside[self.nodes[n as usize].outside as usize];
+        users.users.len() > users.gone as usize
+    }
+
+    /// Changes a choice and updates what depends on it.
+    pub fn update_by_spread(
+        &mut self,
+        code: &Code,
+        target: Target,
+        change: &Change,
+        spread: &Spread,
+    ) -> Result<(), Failure> {
+        let n = target.node;
+        self.pending.push(Pending { node: n, element: target.element, change: change.clone() });
+        self.save(n);
+        self.nodes[n as usize].flags |= TARGET;
+        self.rerun(code, n)?;
+        let base = n - self.slot_facts(code, n).slot;
+        for slot in &spread.slots {
+            let m = base + slot;
+            if self.nodes[m as usize].state == State::Clean && self.reads_changed(code, m) {
+                self.rerun(code, m)?;
+            }
+        }
+        for m in std::iter::once(n).chain(spread.slots.iter().map(|slot| base + slot)) {
+            if self.nodes[m as usize].changed == self.epoch && self.is_read_outside(m) {
+                self.mark_outside_users(code, m);
+            }
+        }
+        self.settle(code)
+    }
+
+    fn reads_changed(&self, code: &Code, n: NodeId) -> bool {
+        let mut changed = false;
+        self.each_dep(code, n, |d, _| changed |= self.nodes[d as usize].changed == self.epoch);
+        changed
+    }
+
+    /// Runs an evaluated node again.
+    fn rerun(&mut self, code: &Code, n: NodeId) -> Result<(), Failure> {
+        self.save(n);
+        let node = &mut self.nodes[n as usize];
+        node.state = State::Running;
+        node.flags |= WAS_STALE;
+        let bottom = self.stack.len();
+        self.stack.push(n);
+        match self.run(code, n) {
+            Ok(Step::Done) => {
+                self.stack.truncate(bottom);
+                Ok(())
+            }
+            Ok(Step::Wait) => self.run_stack(code, bottom),
+            Err(e) => {
+                self.stack.truncate(bottom);
+                Err(e)
+            }
+        }
+    }
+}
