@@ -40,7 +40,7 @@ impl ExactSum {
 
     /// Whether all terms were finite and small.
     #[inline]
-    fn is_fine(&self) -> bool {
+    pub(crate) fn is_fine(&self) -> bool {
         self.coarse.is_none() && (self.negative | self.positive | self.nan) == 0
     }
 

@@ -13,6 +13,7 @@ mod journal;
 mod mark;
 mod node;
 mod path;
+mod peek;
 mod propose;
 mod save;
 mod select;
@@ -32,6 +33,8 @@ use crate::lang::value::{Likelihood, Located, Value};
 use graph::Graph;
 use journal::Before;
 use node::{NONE, State};
+pub(crate) use peek::Peek;
+use peek::Obstacle;
 use std::sync::Arc;
 
 /// One execution of a program: the values of its choices and all that follows from them.
@@ -141,6 +144,35 @@ impl Trace {
                 Err(e)
             }
         }
+    }
+
+    /// The weights that the values of a choice would have in an update, each relative to the present state (that of the
+    /// `current` one is 0); `None` for values that the program does not have. False if that takes updates, since structure depends on the choice.
+    pub(crate) fn weigh_values(
+        &self,
+        target: Target,
+        values: &[Datum],
+        current: usize,
+        peek: &mut Peek,
+        mut weight: impl FnMut(Option<Weight>),
+    ) -> TraceResult<bool> {
+        let g = &self.graph;
+        if self.update.is_some() || target.element != NONE || !g.peek_at(&self.code, target.node, peek) {
+            return Ok(false);
+        }
+        let Some(dist) = g.dist_of(&self.code, target.node) else { return Ok(false) };
+        for (i, v) in values.iter().enumerate() {
+            if i == current {
+                weight(Some(Weight::default()));
+                continue;
+            }
+            match g.peek(&self.code, peek, &dist, v) {
+                Ok(w) => weight(Some(w)),
+                Err(Obstacle::Fault(e)) if e.is_recoverable() => weight(None),
+                Err(_) => return Ok(false),
+            }
+        }
+        Ok(true)
     }
 
     /// Draws the targets anew from the prior, together.

@@ -58,7 +58,7 @@ pub enum Constraint {
 
 /// What an update did to the score. Differences are taken between exact sums, so that they do not depend on the order in
 /// which terms changed.
-#[derive(Clone, Copy, Debug, PartialEq)]
+#[derive(Clone, Copy, Debug, Default, PartialEq)]
 pub struct Weight {
     /// The change of the log joint density, less what was drawn from the prior, plus what an update back would draw from
     /// it: the log acceptance ratio but for the proposal terms of [`Change::Set`].

@@ -9,7 +9,7 @@ use crate::dist::Datum;
 use crate::infer::kernel::{At, Kernel, Outcome, Registered, Scope, accepts, recoverable};
 use crate::num::log_sum_exp;
 use crate::rng::Stream;
-use crate::trace::{Change, Target, Trace, TraceResult};
+use crate::trace::{Change, Peek, Target, Trace, TraceResult};
 
 /// `gibbs(sel)`: draws one choice from its distribution given all else.
 #[derive(Clone, Debug)]
@@ -18,6 +18,7 @@ pub struct Gibbs {
     /// The values of the choice and their log weights, kept from step to step so that nothing is allocated.
     values: Vec<Datum>,
     log: Vec<f64>,
+    peek: Peek,
 }
 
 /// What weighing the values of a choice showed.
@@ -33,7 +34,7 @@ struct Weighed {
 impl Gibbs {
     /// The kernel for one of these choices at a time.
     pub fn new(scope: Scope) -> Self {
-        Gibbs { scope: Registered::new(scope.single()), values: Vec::new(), log: Vec::new() }
+        Gibbs { scope: Registered::new(scope.single()), values: Vec::new(), log: Vec::new(), peek: Peek::default() }
     }
 
     /// The log weights of all values relative to the state, which has value `current`; picking the choice there costs `ways`.
@@ -48,7 +49,18 @@ impl Gibbs {
         first_lane: u64,
     ) -> TraceResult<Weighed> {
         let mut weighed = Weighed::default();
+        let log = &mut self.log;
+        log.clear();
+        let by_peek = trace.weigh_values(target, &self.values, current, &mut self.peek, |w| {
+            weighed.failed += u32::from(w.is_none());
+            let weight = w.map_or(f64::NEG_INFINITY, |w| at.tempered(&w));
+            log.push(if weight.is_nan() { f64::NEG_INFINITY } else { weight });
+        })?;
+        if by_peek {
+            return Ok(weighed);
+        }
         self.log.clear();
+        weighed.failed = 0;
         for (i, v) in self.values.iter().enumerate() {
             if i == current {
                 self.log.push(0.0);
@@ -57,7 +69,7 @@ impl Gibbs {
             let change = [(target, Change::Set(v.clone()))];
             match recoverable(trace.propose(&change, at.draws(first_lane + i as u64)))? {
                 Some(w) => {
-                    let log = at.tempered(&w) + ways - self.scope.ways_back(trace);
+                    let log = at.tempered(&w) + (ways - self.scope.ways_back(trace));
                     self.log.push(if log.is_nan() { f64::NEG_INFINITY } else { log });
                     weighed.structural |= w.appeared > 0 || w.vanished > 0;
                     weighed.pending = Some(i);

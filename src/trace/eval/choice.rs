@@ -101,11 +101,22 @@ impl Graph {
         deps: &mut Deps,
     ) -> Result<Result<Dist, Failure>, NodeId> {
         let values = self.inputs(code, frame, spec.operands(), deps)?;
+        Ok(self.dist_of_values(code, n, spec, &values))
+    }
+
+    /// The distribution with these parameters.
+    pub(crate) fn dist_of_values(
+        &self,
+        code: &Code,
+        n: NodeId,
+        spec: &DistSpec,
+        values: &[&Value],
+    ) -> Result<Dist, Failure> {
         let made = match spec {
             DistSpec::Family { builtin, .. } => {
                 let builtin = code.builtins.get(*builtin);
                 match builtin.kind {
-                    Kind::Distribution(make) => make(&Args { builtin, values: &values }),
+                    Kind::Distribution(make) => make(&Args { builtin, values }),
                     _ => Err(Fault::type_error(format!("`{}` is not a distribution", builtin.name))),
                 }
             }
@@ -119,7 +130,7 @@ impl Graph {
                     .with_hint("write `=` to bind a value")),
             },
         };
-        Ok(made.map_err(|f| self.fault(code, n, f)))
+        made.map_err(|f| self.fault(code, n, f))
     }
 
     fn own_keyed(&self, code: &Code, n: NodeId, frame: FrameId, site: u32, keys: &[Operand]) -> Result<u64, Failure> {

@@ -6,6 +6,8 @@ mod container;
 mod loops;
 mod observe;
 
+pub(crate) use observe::Score;
+
 use super::demand::{Failure, Step};
 use super::graph::Graph;
 use super::node::*;
@@ -174,7 +176,7 @@ impl Graph {
 }
 
 /// Calls a built-in with values.
-pub(super) fn apply(builtin: &Builtin, values: &[&Value]) -> Result<Value, Fault> {
+pub(crate) fn apply(builtin: &Builtin, values: &[&Value]) -> Result<Value, Fault> {
     let args = Args { builtin, values };
     match builtin.kind {
         Kind::Function(f) => f(&args),

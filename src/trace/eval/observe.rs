@@ -10,9 +10,11 @@ use crate::trace::graph::Graph;
 use crate::trace::journal::Entry;
 use crate::trace::node::*;
 
-/// The score of an observation: one term, or one an element.
-enum Score {
+/// The score of an observation.
+pub(crate) enum Score {
+    /// One term.
     One(f64),
+    /// One an element.
     Sum(ExactSum),
 }
 
@@ -73,26 +75,34 @@ impl Graph {
         value: Operand,
         deps: &mut Deps,
     ) -> Result<Result<Score, Failure>, NodeId> {
+        let values = self.inputs(code, frame, spec.operands(), deps)?;
+        let observed = self.inputs(code, frame, &[value], deps)?[0];
+        Ok(self.score_of_values(code, n, spec, &values, observed))
+    }
+
+    /// The score of an observation with these parameters.
+    pub(crate) fn score_of_values(
+        &self,
+        code: &Code,
+        n: NodeId,
+        spec: &DistSpec,
+        values: &[&Value],
+        observed: &Value,
+    ) -> Result<Score, Failure> {
         if let DistSpec::Value(_) = spec {
-            match self.inputs(code, frame, spec.operands(), deps)?[0] {
+            match values[0] {
                 Value::Dist(_) => {}
                 v @ Value::Likelihood(_) => {
-                    let observed = self.inputs(code, frame, &[value], deps)?[0];
-                    let score = likelihood_score(v, observed).map(Score::One);
-                    return Ok(score.map_err(|f| self.fault(code, n, f)));
+                    return likelihood_score(v, observed).map(Score::One).map_err(|f| self.fault(code, n, f));
                 }
                 v => {
                     let message = format!("`observe` needs a distribution or likelihood, got {}", v.type_name());
-                    return Ok(Err(self.type_error(code, n, message)));
+                    return Err(self.type_error(code, n, message));
                 }
             }
         }
-        let dist = match self.dist_now(code, n, frame, spec, deps)? {
-            Ok(dist) => dist,
-            Err(e) => return Ok(Err(e)),
-        };
-        let observed = self.inputs(code, frame, &[value], deps)?[0];
-        Ok(score_value(&dist, observed).map_err(|f| self.fault(code, n, f)))
+        let dist = self.dist_of_values(code, n, spec, values)?;
+        score_value(&dist, observed).map_err(|f| self.fault(code, n, f))
     }
 
     /// The log density of an observation's coarse surrogate: never part of the joint.
@@ -144,15 +154,17 @@ impl Graph {
 
     /// Takes an observation's or factor's score back.
     pub(crate) fn retire_score(&mut self, n: NodeId) {
-        match self.nodes[n as usize].side.as_deref() {
-            Some(Side::Total(t)) if self.nodes[n as usize].score == 0.0 => {
-                let sum = t.sum.clone();
-                self.likelihood.unmerge(&sum);
-            }
-            _ => {
-                let score = self.nodes[n as usize].score;
-                self.likelihood.sub(score);
-            }
+        let mut likelihood = std::mem::take(&mut self.likelihood);
+        self.take_score(n, &mut likelihood);
+        self.likelihood = likelihood;
+    }
+
+    /// Takes an observation's or factor's score out of a sum.
+    pub(crate) fn take_score(&self, n: NodeId, from: &mut ExactSum) {
+        let node = &self.nodes[n as usize];
+        match node.side.as_deref() {
+            Some(Side::Total(t)) if node.score == 0.0 => from.unmerge(&t.sum),
+            _ => from.sub(node.score),
         }
     }
 }

@@ -1,0 +1,322 @@
+//! What a choice's other values would weigh, without an update.
+//!
+//! Gibbs updates ask for the weight of every value and keep one. Where a value changes no structure, the weight is that of
+//! the few observations and choices that depend on it, so those are scored beside the trace: nothing is journaled, released
+//! or rolled back. Terms are quantised as in an update, so the weights are the same to the last bit. What would change
+//! structure, or is of a kind not handled here, is left to an update.
+
+use super::demand::Failure;
+use super::eval::{Score, apply};
+use super::graph::Graph;
+use super::node::*;
+use super::propose::Weight;
+use crate::dist::{Datum, Dist};
+use crate::lang::code::{Code, DistSpec, Op, Operand};
+use crate::lang::index::index_value;
+use crate::lang::value::Value;
+use crate::num::ExactSum;
+use smallvec::SmallVec;
+
+/// What depends on a choice: found once, good until the trace changes.
+#[derive(Clone, Debug, Default)]
+pub(crate) struct Peek {
+    target: NodeId,
+    /// Computations, with their values under the value being weighed, and those that only it asks for.
+    values: Vec<(NodeId, Option<Value>)>,
+    /// How many of them depend on the choice.
+    dependent: usize,
+    /// Observations, factors and choices that are scored.
+    sinks: Vec<NodeId>,
+    /// How often each node would be let go.
+    released: Vec<(NodeId, u32)>,
+    stack: Vec<NodeId>,
+}
+
+/// The most computations and scores it is worth doing this way.
+const MOST: usize = 48;
+
+/// Why a value cannot be weighed here.
+pub(crate) enum Obstacle {
+    /// An update must decide.
+    Unsuitable,
+    /// The program has no value there.
+    Fault(Failure),
+}
+
+impl From<Failure> for Obstacle {
+    fn from(e: Failure) -> Self {
+        Obstacle::Fault(e)
+    }
+}
+
+impl Graph {
+    /// Finds what depends on a choice; false if its values must be weighed by updates.
+    pub fn peek_at(&self, code: &Code, target: NodeId, peek: &mut Peek) -> bool {
+        peek.target = target;
+        peek.values.clear();
+        peek.sinks.clear();
+        let finite = self.prior.is_fine() && self.likelihood.is_fine();
+        if !self.incremental || !finite || !self.is_plain_choice(target) {
+            return false;
+        }
+        peek.stack.clear();
+        peek.stack.push(target);
+        while let Some(n) = peek.stack.pop() {
+            let facts = self.slot_facts(code, n);
+            if facts.is_result {
+                return false;
+            }
+            let outside = &self.outside[self.nodes[n as usize].outside as usize].users;
+            if outside.len() + peek.values.len() + peek.sinks.len() > MOST {
+                return false;
+            }
+            for m in facts.users.iter().map(|u| n - facts.slot + u).chain(outside.iter().copied()) {
+                if self.nodes[m as usize].state != State::Clean || peek.knows(m) {
+                    continue;
+                }
+                match self.op(code, m) {
+                    Op::Prim { .. } | Op::Array(_) | Op::Record { .. } | Op::Index { .. } | Op::Select { .. } => {
+                        peek.values.push((m, None));
+                        peek.stack.push(m);
+                    }
+                    Op::Observe { .. } | Op::Factor { .. } => peek.sinks.push(m),
+                    Op::Draw { dist: DistSpec::Family { .. }, .. } if self.is_plain_choice(m) => peek.sinks.push(m),
+                    _ => return false,
+                }
+            }
+        }
+        peek.dependent = peek.values.len();
+        let keyed = |n: &NodeId| match self.op(code, *n) {
+            Op::Draw { keys, .. } => {
+                let frame = self.nodes[*n as usize].frame;
+                keys.iter().any(|k| self.resolve(frame, *k).is_some_and(|d| d == target || peek.knows(d)))
+            }
+            _ => false,
+        };
+        !peek.sinks.iter().any(keyed)
+    }
+
+    /// A single number or truth value, stored as the program sees it.
+    fn is_plain_choice(&self, n: NodeId) -> bool {
+        let node = &self.nodes[n as usize];
+        let whole = match node.side.as_deref() {
+            None => true,
+            Some(Side::Choice(c)) => c.stored.is_none() && c.elements == NONE && c.deps.is_empty(),
+            _ => false,
+        };
+        whole && matches!(node.value, Value::Num(_) | Value::Bool(_))
+    }
+
+    /// The weight of a value of the choice, relative to the present one.
+    pub fn peek(&self, code: &Code, peek: &mut Peek, dist: &Dist, value: &Datum) -> Result<Weight, Obstacle> {
+        peek.values.truncate(peek.dependent);
+        peek.values.iter_mut().for_each(|(_, v)| *v = None);
+        peek.released.clear();
+        let target = peek.target;
+        let (mut prior, mut likelihood) = (ExactSum::default(), ExactSum::default());
+        prior.sub(self.nodes[target as usize].score);
+        prior.add(dist.log_density_stored(value));
+        let value = Value::from_datum(value);
+        for i in 0..peek.sinks.len() {
+            let n = peek.sinks[i];
+            let node = &self.nodes[n as usize];
+            match self.op(code, n) {
+                Op::Draw { dist: spec, .. } => {
+                    let values = self.peek_all(code, peek, &value, node.frame, spec.operands())?;
+                    let dist = self.dist_of_values(code, n, spec, &refs(&values))?;
+                    let stored = self.stored(n).filter(|x| dist.elements().is_none() && dist.stored_support().fits(x));
+                    let stored = stored.ok_or(Obstacle::Unsuitable)?;
+                    if dist.is_stored_whitened() {
+                        return Err(Obstacle::Unsuitable);
+                    }
+                    prior.sub(node.score);
+                    prior.add(dist.log_density_stored(&stored));
+                }
+                Op::Observe { dist: spec, value: observed, .. } => {
+                    let values = self.peek_all(code, peek, &value, node.frame, spec.operands())?;
+                    let observed = self.peek_operand(code, peek, &value, node.frame, *observed)?;
+                    let score = self.score_of_values(code, n, spec, &refs(&values), &observed)?;
+                    self.take_score(n, &mut likelihood);
+                    match score {
+                        Score::One(x) => likelihood.add(x),
+                        Score::Sum(sum) => likelihood.merge(&sum),
+                    }
+                }
+                Op::Factor { weight, .. } => {
+                    match self.peek_operand(code, peek, &value, node.frame, *weight)? {
+                        Value::Num(w) if !w.is_nan() => {
+                            likelihood.sub(node.score);
+                            likelihood.add(w);
+                        }
+                        _ => return Err(Obstacle::Unsuitable),
+                    }
+                }
+                _ => return Err(Obstacle::Unsuitable),
+            }
+        }
+        let none = ExactSum::default();
+        let log_joint = ExactSum::balance([&prior, &likelihood, &none], [&none, &none, &none]);
+        Ok(Weight {
+            log_weight: log_joint,
+            log_joint,
+            log_likelihood: ExactSum::difference(&likelihood, &none),
+            log_jacobian: 0.0,
+            appeared: 0,
+            vanished: 0,
+        })
+    }
+
+    fn peek_all(
+        &self,
+        code: &Code,
+        peek: &mut Peek,
+        value: &Value,
+        frame: FrameId,
+        operands: &[Operand],
+    ) -> Result<SmallVec<[Value; 4]>, Obstacle> {
+        let mut values = SmallVec::new();
+        for o in operands {
+            values.push(self.peek_operand(code, peek, value, frame, *o)?);
+        }
+        Ok(values)
+    }
+
+    fn peek_operand(
+        &self,
+        code: &Code,
+        peek: &mut Peek,
+        value: &Value,
+        frame: FrameId,
+        o: Operand,
+    ) -> Result<Value, Obstacle> {
+        let v = match self.resolve(frame, o) {
+            None => self.value(code, frame, o).clone(),
+            Some(n) => self.peek_node(code, peek, value, n)?,
+        };
+        let Value::Container(r) = v else { return Ok(v) };
+        let gather = &self.nodes[r.node as usize + 1];
+        if gather.state == State::Clean { Ok(gather.value.clone()) } else { Err(Obstacle::Unsuitable) }
+    }
+
+    /// The value a node would have.
+    fn peek_node(&self, code: &Code, peek: &mut Peek, value: &Value, n: NodeId) -> Result<Value, Obstacle> {
+        if n == peek.target {
+            return Ok(value.clone());
+        }
+        let node = &self.nodes[n as usize];
+        let place = peek.values.iter().position(|(m, _)| *m == n);
+        match place.map(|i| &peek.values[i].1) {
+            Some(Some(v)) => return Ok(v.clone()),
+            None if node.state == State::Clean => return Ok(node.value.clone()),
+            None if peek.values.len() > MOST => return Err(Obstacle::Unsuitable),
+            _ => {}
+        }
+        let frame = node.frame;
+        let v = match self.op(code, n) {
+            Op::Prim { builtin, args } => {
+                let values = self.peek_all(code, peek, value, frame, args)?;
+                apply(code.builtins.get(*builtin), &refs(&values)).map_err(|f| self.fail(code, n, f.kind, f.message, f.hint))?
+            }
+            Op::Array(items) => Value::from_elements(self.peek_all(code, peek, value, frame, items)?.into_vec()),
+            Op::Record { names, values } => {
+                let values = self.peek_all(code, peek, value, frame, values)?;
+                Value::Record(std::sync::Arc::new(names.iter().cloned().zip(values).collect()))
+            }
+            Op::Index { base, keys } => self.peek_index(code, peek, value, n, *base, keys)?,
+            Op::Select { cond, then, otherwise } => {
+                let holds = match self.peek_operand(code, peek, value, frame, *cond)? {
+                    Value::Bool(b) => b,
+                    _ => return Err(Obstacle::Unsuitable),
+                };
+                let (chosen, other) = if holds { (then, otherwise) } else { (otherwise, then) };
+                if node.state == State::Clean && holds != (node.flags & OTHERWISE == 0) {
+                    self.let_go(code, peek, frame, *other)?;
+                }
+                match self.resolve(frame, *chosen) {
+                    Some(m) => self.peek_node(code, peek, value, m)?,
+                    None => self.value(code, frame, *chosen).clone(),
+                }
+            }
+            // A choice that would appear, or something with structure of its own.
+            _ => return Err(Obstacle::Unsuitable),
+        };
+        match place {
+            Some(i) => peek.values[i].1 = Some(v.clone()),
+            None => peek.values.push((n, Some(v.clone()))),
+        }
+        Ok(v)
+    }
+
+    fn peek_index(
+        &self,
+        code: &Code,
+        peek: &mut Peek,
+        value: &Value,
+        n: NodeId,
+        base: Operand,
+        keys: &[Operand],
+    ) -> Result<Value, Obstacle> {
+        let frame = self.nodes[n as usize].frame;
+        let whole = match self.resolve(frame, base) {
+            Some(b) => self.peek_node(code, peek, value, b)?,
+            None => self.value(code, frame, base).clone(),
+        };
+        if let Value::Container(r) = whole {
+            // The same element as before, if the keys are the same.
+            let depends = |o: &Operand| self.resolve(frame, *o).is_some_and(|d| d == peek.target || peek.knows(d));
+            return match self.nodes[n as usize].side.as_deref() {
+                Some(Side::Deps(deps)) if deps.len() == 1 && deps[0] != r.node + 1 && !keys.iter().any(depends) => {
+                    self.peek_node(code, peek, value, deps[0])
+                }
+                _ => Err(Obstacle::Unsuitable),
+            };
+        }
+        let mut v = whole;
+        for k in keys {
+            let key = self.peek_operand(code, peek, value, frame, *k)?;
+            v = index_value(&v, &key).map_err(|f| self.fail(code, n, f.kind, f.message, f.hint))?;
+            if matches!(v, Value::Container(_)) {
+                return Err(Obstacle::Unsuitable);
+            }
+        }
+        Ok(v)
+    }
+
+    /// Notes that a node would be let go, with what it alone holds; a choice that nothing else holds would vanish.
+    fn let_go(&self, code: &Code, peek: &mut Peek, frame: FrameId, o: Operand) -> Result<(), Obstacle> {
+        let mut gone: SmallVec<[NodeId; 8]> = self.resolve(frame, o).into_iter().collect();
+        while let Some(n) = gone.pop() {
+            let times = match peek.released.iter_mut().find(|(m, _)| *m == n) {
+                Some((_, times)) => {
+                    *times += 1;
+                    *times
+                }
+                None => {
+                    peek.released.push((n, 1));
+                    1
+                }
+            };
+            if times < self.nodes[n as usize].refs {
+                continue;
+            }
+            if !matches!(
+                self.op(code, n),
+                Op::Prim { .. } | Op::Array(_) | Op::Record { .. } | Op::Index { .. } | Op::Select { .. } | Op::Item
+            ) {
+                return Err(Obstacle::Unsuitable);
+            }
+            self.each_dep(code, n, |d, _| gone.push(d));
+        }
+        Ok(())
+    }
+}
+
+impl Peek {
+    fn knows(&self, n: NodeId) -> bool {
+        self.values.iter().any(|(m, _)| *m == n) || self.sinks.contains(&n)
+    }
+}
+
+fn refs(values: &[Value]) -> SmallVec<[&Value; 4]> {
+    values.iter().collect()
+}
