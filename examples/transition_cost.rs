@@ -24,13 +24,22 @@ fn main() {
     let loaded = cpu();
     let mut trace = model.simulate(1, 0).unwrap_or_else(|e| panic!("{e}"));
     let started = cpu();
-    let sel = Selector::Tag { name: if args.first().map(String::as_str) == Some("hmm") { "state".into() } else { "flag".into() }, value: None };
+    let sel = Selector::Tag {
+        name: if args.first().map(String::as_str) == Some("hmm") { "state".into() } else { "flag".into() },
+        value: None,
+    };
     let mut kernel = Gibbs::new(Scope { selector: sel, pick: Pick::One });
     go(&mut kernel, &mut trace, 1000.min(count), 0);
     let warm = cpu();
     let accepted = go(&mut kernel, &mut trace, count, 1000);
     let done = cpu();
-    println!("n {n}: load {:.2} s, start {:.2} s, {:.3} us a transition, {accepted} moved, {} MiB", loaded - clock, started - loaded, (done - warm) / count as f64 * 1e6, rss());
+    println!(
+        "n {n}: load {:.2} s, start {:.2} s, {:.3} us a transition, {accepted} moved, {} MiB",
+        loaded - clock,
+        started - loaded,
+        (done - warm) / count as f64 * 1e6,
+        rss()
+    );
 }
 
 fn go(kernel: &mut dyn Kernel, trace: &mut Trace, count: usize, first: u64) -> u64 {
@@ -48,7 +57,9 @@ fn array(n: usize, f: impl Fn(usize) -> f64) -> Value {
 
 fn linreg(n: usize) -> Model {
     let x = array(n, |i| -5.0 + 10.0 * ((i * 7919) % 1000) as f64 / 1000.0);
-    let y = array(n, |i| if i % 10 == 3 { ((i * 31) % 41) as f64 - 20.0 } else { 7.0 - 10.0 * ((i * 7919) % 1000) as f64 / 1000.0 });
+    let y = array(n, |i| {
+        if i % 10 == 3 { ((i * 31) % 41) as f64 - 20.0 } else { 7.0 - 10.0 * ((i * 7919) % 1000) as f64 / 1000.0 }
+    });
     compile(include_str!("../benches/peers/linreg.pcad"), vec![("x", x), ("y", y)])
 }
 
@@ -58,7 +69,12 @@ fn hmm(n: usize) -> Model {
     let trans = Value::List(vec![row(0), row(1), row(2)].into());
     compile(
         include_str!("../benches/peers/hmm.pcad"),
-        vec![("y", y), ("trans", trans), ("mu", array(3, |i| 2.0 * i as f64 - 2.0)), ("probe", Value::Num((n / 2) as f64))],
+        vec![
+            ("y", y),
+            ("trans", trans),
+            ("mu", array(3, |i| 2.0 * i as f64 - 2.0)),
+            ("probe", Value::Num((n / 2) as f64)),
+        ],
     )
 }
 

@@ -3,6 +3,9 @@
 use crate::trace::{ChoiceKind, Selector, Trace};
 
 /// The plan for a program whose observations ask for these choices, as program text.
+///
+/// Where the density has a gradient, `nuts` moves all continuous choices together and a sweep of `gibbs` the finite ones; the
+/// rest is left to kernels that need no slope.
 pub fn default_plan(trace: &mut Trace) -> String {
     let mut count = |kind| {
         let s = trace.select(&Selector::Kind(kind));
@@ -10,6 +13,39 @@ pub fn default_plan(trace: &mut Trace) -> String {
     };
     let (continuous, discrete) = (count(ChoiceKind::Continuous), count(ChoiceKind::Discrete));
     let (finite, gaussian) = (count(ChoiceKind::Finite), count(ChoiceKind::Gaussian));
+    if continuous + discrete == 0 {
+        return "infer {\n  repeat 1000 { }\n}\n".into();
+    }
+    if continuous > 0 && has_gradient(trace) {
+        with_gradient(finite, discrete)
+    } else {
+        without_gradient(continuous, discrete, finite, gaussian)
+    }
+}
+
+/// Whether the density has a derivative by its continuous choices.
+fn has_gradient(trace: &mut Trace) -> bool {
+    let selection = trace.select(&Selector::Kind(ChoiceKind::Continuous));
+    let targets = trace.targets(selection).to_vec();
+    trace.gradient(&targets, 1.0, &mut Vec::new()).is_ok()
+}
+
+fn with_gradient(finite: usize, discrete: usize) -> String {
+    let mut pass = String::from(" nuts($continuous);");
+    if finite > 0 {
+        pass += " gibbs(each($finite));";
+    }
+    if discrete > finite {
+        let unbounded = discrete - finite;
+        pass += &format!(
+            " repeat {} {{ mh(one($discrete - $finite)); drift(one($discrete - $finite)); }}",
+            unbounded.min(50)
+        );
+    }
+    format!("infer {{\n  init(best_of(20));\n  warmup 1000 {{{pass} }}\n  repeat 1000 {{{pass} }}\n}}\n")
+}
+
+fn without_gradient(continuous: usize, discrete: usize, finite: usize, gaussian: usize) -> String {
     let mut arms = Vec::new();
     if continuous > 0 {
         arms.push((5.0, "drift(one($continuous))"));
@@ -31,13 +67,9 @@ pub fn default_plan(trace: &mut Trace) -> String {
         arms.push((3.0, "mh(one($discrete))"));
         arms.push((1.0, "drift(one($discrete))"));
     }
-    let choices = continuous + discrete;
-    if choices == 0 {
-        return "infer {\n  repeat 1000 { }\n}\n".into();
-    }
     let total: f64 = arms.iter().map(|(w, _)| w).sum();
     let arms: String = arms.iter().map(|(w, k)| format!(" {:.2} => {k};", w / total)).collect();
-    let sweep = choices.clamp(10, 200);
+    let sweep = (continuous + discrete).clamp(10, 200);
     format!(
         "infer {{\n  init(best_of(20));\n  warmup {} {{ mix {{{arms} }} }}\n  repeat 1000 {{ repeat {sweep} {{ mix {{{arms} }} }} }}\n}}\n",
         (sweep * 200).min(20_000)

@@ -115,6 +115,15 @@ pub struct KernelStats {
 }
 
 impl KernelStats {
+    /// Adds what a step did, and the time it took.
+    pub fn add(&mut self, outcome: &super::Outcome, time: std::time::Duration) {
+        self.proposals += u64::from(outcome.proposals);
+        self.accepted += u64::from(outcome.accepted);
+        self.failed += u64::from(outcome.failed);
+        self.divergent += u64::from(outcome.divergent);
+        self.seconds += time.as_secs_f64();
+    }
+
     /// Accepted proposals per proposal; `None` if there was none.
     pub fn acceptance(&self) -> Option<f64> {
         (self.proposals > 0).then(|| self.accepted as f64 / self.proposals as f64)

@@ -76,6 +76,12 @@ pub(crate) fn evaluate(e: &Expr, env: &mut Scope) -> Result<Value, Box<RunError>
             match &**name {
                 "elapsed" => return Ok(Value::Num(env.started.elapsed().as_secs_f64())),
                 "steps" => return Ok(Value::Num(env.steps as f64)),
+                "value" => {
+                    let [arg] = &args[..] else { return Err(unsupported(e)) };
+                    let at = super::selection::address(&arg.value, env)?;
+                    let found = env.trace.find(&at).map(|t| env.trace.value(t));
+                    return found.ok_or_else(|| fail(arg.value.span, format!("there is no choice {at} in this state")));
+                }
                 "log_joint" => return Ok(Value::Num(env.trace.log_joint())),
                 "log_prior" => return Ok(Value::Num(env.trace.log_prior())),
                 "log_likelihood" => return Ok(Value::Num(env.trace.log_likelihood())),
@@ -108,6 +114,14 @@ fn builtin(name: &str, values: &[&Value], e: &Expr, env: &Scope) -> Result<Value
                 error.hint = f.hint;
                 error
             }),
+            Kind::Distribution(f) => match f(&Args { builtin: b, values }) {
+                Ok(d) => Ok(Value::Dist(Arc::new(d))),
+                Err(f) => {
+                    let mut error = fail(e.span, f.message);
+                    (error.kind, error.hint) = (f.kind, f.hint);
+                    Err(error)
+                }
+            },
             _ => Err(fail(e.span, format!("`{name}` is not available in this place"))),
         },
         None => Err(fail(e.span, format!("`{name}` is not known here"))),

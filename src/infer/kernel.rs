@@ -1,6 +1,7 @@
 //! What a kernel is: one step of a chain that leaves the posterior invariant.
 
 use crate::lang::error::RunError;
+use crate::lang::key::mix;
 use crate::rng::{Purpose, Stream, StreamKey};
 use crate::trace::{Draws, Selection, Selector, Target, Trace, TraceResult, Weight};
 use std::sync::Arc;
@@ -20,22 +21,31 @@ pub struct At {
     pub power: f64,
     /// Which member of a sweep a step is for (see [`Kernel::sweep`]).
     pub member: usize,
+    /// Tells steps within a step apart (see [`At::within`]); 0 for the step itself.
+    pub part: u64,
 }
 
 impl At {
     /// A step of the posterior itself, outside of warm-up.
     pub fn new(seed: u64, chain: u32, step: u64) -> Self {
-        At { seed, chain, step, adapting: false, power: 1.0, member: 0 }
+        At { seed, chain, step, adapting: false, power: 1.0, member: 0, part: 0 }
     }
 
     /// The randomness of values drawn inside the trace; `lane` tells alternatives of one step apart.
     pub fn draws(&self, lane: u64) -> Draws {
-        Draws { key: StreamKey::new(self.seed, self.chain, Purpose::VALUES), step: self.step, lane }
+        let key = StreamKey::new(self.seed, self.chain, Purpose::VALUES);
+        let lane = if self.part == 0 { lane } else { mix(self.part, lane) };
+        Draws { key, step: self.step, lane }
+    }
+
+    /// The place of a step that is part `i` of this one, with randomness of its own.
+    pub fn within(&self, i: u64) -> At {
+        At { part: mix(self.part, i + 1), member: 0, ..*self }
     }
 
     /// The kernel's own randomness.
     pub fn stream(&self) -> Stream {
-        StreamKey::new(self.seed, self.chain, Purpose::KERNEL).stream(self.step, 0, 0)
+        StreamKey::new(self.seed, self.chain, Purpose::KERNEL).stream(self.step, 0, self.part)
     }
 
     /// The log weight of an update with the likelihood raised to the power.
@@ -63,6 +73,14 @@ impl Outcome {
         Outcome { proposals: 1, accepted: u32::from(accepted), ..Default::default() }
     }
 
+    /// Adds what another step did.
+    pub fn add(&mut self, other: Outcome) {
+        self.proposals += other.proposals;
+        self.accepted += other.accepted;
+        self.failed += other.failed;
+        self.divergent += other.divergent;
+    }
+
     /// One proposal that led to a domain error.
     pub fn failed() -> Self {
         Outcome { proposals: 1, failed: 1, ..Default::default() }
@@ -86,6 +104,16 @@ pub trait Kernel: Send {
     /// # Errors
     /// Errors of the program that are not a matter of the proposed values.
     fn step(&mut self, trace: &mut Trace, at: &At) -> TraceResult<Outcome>;
+}
+
+/// One step of a kernel inside another: a whole sweep where it goes through its choices in turn.
+pub(crate) fn inner_step(kernel: &mut dyn Kernel, trace: &mut Trace, at: &At) -> TraceResult<Outcome> {
+    let Some(members) = kernel.sweep(trace) else { return kernel.step(trace, at) };
+    let mut all = Outcome::default();
+    for member in 0..members {
+        all.add(kernel.step(trace, &At { member, ..at.within(member as u64) })?);
+    }
+    Ok(all)
 }
 
 /// Which of the selected choices a step moves.
@@ -122,7 +150,8 @@ impl Scope {
 #[derive(Clone, Debug)]
 pub(crate) struct Registered {
     pub scope: Scope,
-    selection: Option<Selection>,
+    /// The selection, and the trace it is registered with.
+    selection: Option<(Arc<()>, Selection)>,
     sweep: Option<Sweep>,
 }
 
@@ -140,7 +169,14 @@ impl Registered {
 
     /// The selection in this kernel's trace.
     pub fn selection(&mut self, trace: &mut Trace) -> Selection {
-        *self.selection.get_or_insert_with(|| trace.select(&self.scope.selector))
+        match &self.selection {
+            Some((of, s)) if Arc::ptr_eq(of, trace.identity()) => *s,
+            _ => {
+                let s = trace.select(&self.scope.selector);
+                self.selection = Some((Arc::clone(trace.identity()), s));
+                s
+            }
+        }
     }
 
     /// How many steps a sweep over the members is, if steps are parts of sweeps.
@@ -185,7 +221,7 @@ impl Registered {
     /// What picking the same members costs in the proposed state: single-site picking pays the ratio of the numbers, a sweep
     /// cannot go on among other members.
     pub fn ways_back(&self, trace: &Trace) -> f64 {
-        let Some(selection) = self.selection else { return 0.0 };
+        let Some((_, selection)) = self.selection else { return 0.0 };
         match (self.scope.pick, &self.sweep) {
             (Pick::One, _) => libm::log(trace.targets(selection).len() as f64),
             (Pick::Each, Some(s)) if !Arc::ptr_eq(&s.of, trace.listed(selection)) => f64::INFINITY,

@@ -1,5 +1,6 @@
 //! Inference: kernels, plans, chains, diagnostics. Knows traces; knows nothing of pictures.
 
+mod build;
 mod chains;
 mod default_plan;
 pub mod diagnostics;
@@ -18,5 +19,5 @@ pub use chains::run_chains;
 pub use default_plan::default_plan;
 pub use init::{Start, StartError, starts};
 pub use kernel::{At, Kernel, Outcome, Pick, Scope};
-pub use kernels::{Block, Drift, Elliptical, Gibbs, Mh};
+pub use kernels::{Block, Drift, Elliptical, Gibbs, Hmc, Mh, Nuts, Optimize, Slice, Temper};
 pub use plan::{ChainError, ChainResult, Progress, RunOptions, Watch};

@@ -6,7 +6,7 @@ use crate::lang::error::{FaultKind, RunError};
 use crate::lang::key::Key;
 use crate::syntax::ast::{self, BinaryOp, Expr, ExprKind, SegmentName};
 use crate::syntax::span::Span;
-use crate::trace::{ChoiceKind, Pattern, PatternSegment, Selector};
+use crate::trace::{Address, AddressSegment, ChoiceKind, Pattern, PatternSegment, Selector};
 use std::sync::Arc;
 
 /// Reads a selection, with `one(…)` or `each(…)` around it or not.
@@ -107,6 +107,22 @@ pub(crate) fn pattern(a: &ast::Address, env: &mut Scope) -> Result<Pattern, Box<
         segments.push(PatternSegment::Segment { name, occurrence: s.occurrence, keys });
     }
     Ok(Pattern { segments })
+}
+
+/// Reads the address of one choice; keys may be computed.
+///
+/// # Errors
+/// If it has wildcards, or a computed key fails or is not a key.
+pub(crate) fn address(e: &Expr, env: &mut Scope) -> Result<Address, Box<RunError>> {
+    let one = || fail(e.span, "the address of one choice was expected, without wildcards".into());
+    let ExprKind::Address(a) = &e.kind else { return Err(one()) };
+    let mut segments = Vec::with_capacity(a.segments.len());
+    for s in pattern(a, env)?.segments {
+        let PatternSegment::Segment { name: Some(name), occurrence, keys } = s else { return Err(one()) };
+        let keys = keys.into_iter().collect::<Option<Vec<Key>>>().ok_or_else(one)?;
+        segments.push(AddressSegment { name, occurrence: occurrence.max(1), keys });
+    }
+    Ok(Address { segments })
 }
 
 fn not_a_selection(span: Span) -> Box<RunError> {

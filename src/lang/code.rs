@@ -61,6 +61,8 @@ pub struct Code {
     pub forces: Vec<Force>,
     /// `freeze sel;` statements, in order.
     pub freezes: Vec<crate::syntax::ast::Expr>,
+    /// The kernels the program declares.
+    pub kernels: Vec<crate::syntax::ast::KernelDecl>,
     /// Expressions of inference blocks, reports and exports that only read the model, by their place.
     pub queries: rustc_hash::FxHashMap<Span, Operand>,
 }
@@ -439,10 +441,7 @@ impl Op {
 impl Op {
     /// Where its operands are, if those it always reads are all it holds.
     fn reads(&self) -> Option<Box<[(u16, Slot)]>> {
-        if matches!(
-            self,
-            Op::Param { .. } | Op::Call { .. } | Op::Select { .. } | Op::Fold { .. } | Op::Gather
-        ) {
+        if matches!(self, Op::Param { .. } | Op::Call { .. } | Op::Select { .. } | Op::Fold { .. } | Op::Gather) {
             return None;
         }
         let mut reads = Vec::new();
@@ -458,15 +457,7 @@ impl Op {
 impl Block {
     /// An empty block.
     pub fn new(kind: BlockKind, parent: Option<BlockId>) -> Self {
-        Block {
-            kind,
-            parent,
-            ops: Vec::new(),
-            spans: Vec::new(),
-            result: None,
-            first: 0,
-            effects: Vec::new(),
-        }
+        Block { kind, parent, ops: Vec::new(), spans: Vec::new(), result: None, first: 0, effects: Vec::new() }
     }
 
     /// How many slots it has.

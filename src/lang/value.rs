@@ -130,6 +130,14 @@ pub trait Likelihood: fmt::Debug + Send + Sync {
 }
 
 impl Value {
+    /// What a `for` over it goes through: its elements, or the names of a record.
+    pub fn passes(&self) -> Vec<Value> {
+        match self {
+            Value::Record(r) => r.keys().map(|k| Value::Str(Arc::clone(k))).collect(),
+            v => (0..v.len().unwrap_or(0)).filter_map(|i| v.element(i)).collect(),
+        }
+    }
+
     /// An array of numbers.
     pub fn array(xs: impl Into<Arc<[f64]>>) -> Self {
         Value::Array(xs.into())

@@ -33,16 +33,25 @@ use crate::lang::value::{Likelihood, Located, Value};
 use graph::Graph;
 use journal::Before;
 use node::{NONE, State};
-pub(crate) use peek::Peek;
 use peek::Obstacle;
+pub(crate) use peek::Peek;
 use std::sync::Arc;
 
 /// One execution of a program: the values of its choices and all that follows from them.
-#[derive(Clone, Debug)]
+#[derive(Debug)]
 pub struct Trace {
     code: Arc<Code>,
     graph: Graph,
     update: Option<Before>,
+    /// What selections belong to: a clone registers its own.
+    identity: Arc<()>,
+}
+
+impl Clone for Trace {
+    fn clone(&self) -> Self {
+        let (code, graph) = (Arc::clone(&self.code), self.graph.clone());
+        Trace { code, graph, update: self.update.clone(), identity: Arc::new(()) }
+    }
 }
 
 /// A failure of an operation on a trace; the trace is as it was before.
@@ -52,7 +61,7 @@ impl Trace {
     /// A trace in which nothing has run: queries draw from the prior, observations are ignored.
     pub fn prior(code: Arc<Code>, limits: Limits) -> Self {
         let graph = Graph::new(&code, limits);
-        Trace { code, graph, update: None }
+        Trace { code, graph, update: None, identity: Arc::new(()) }
     }
 
     /// Runs a program: draws what its observations ask for.
@@ -284,6 +293,11 @@ impl Trace {
     /// The choices a selection now has.
     pub fn targets(&self, selection: Selection) -> &[Target] {
         self.graph.choices.selections[selection.0 as usize].targets()
+    }
+
+    /// What selections belong to.
+    pub(crate) fn identity(&self) -> &Arc<()> {
+        &self.identity
     }
 
     /// The choices a selection now has, as kept: another list as soon as they change.

@@ -142,15 +142,13 @@ impl Graph {
                         Score::Sum(sum) => likelihood.merge(&sum),
                     }
                 }
-                Op::Factor { weight, .. } => {
-                    match self.peek_operand(code, peek, &value, node.frame, *weight)? {
-                        Value::Num(w) if !w.is_nan() => {
-                            likelihood.sub(node.score);
-                            likelihood.add(w);
-                        }
-                        _ => return Err(Obstacle::Unsuitable),
+                Op::Factor { weight, .. } => match self.peek_operand(code, peek, &value, node.frame, *weight)? {
+                    Value::Num(w) if !w.is_nan() => {
+                        likelihood.sub(node.score);
+                        likelihood.add(w);
                     }
-                }
+                    _ => return Err(Obstacle::Unsuitable),
+                },
                 _ => return Err(Obstacle::Unsuitable),
             }
         }
@@ -215,7 +213,8 @@ impl Graph {
         let v = match self.op(code, n) {
             Op::Prim { builtin, args } => {
                 let values = self.peek_all(code, peek, value, frame, args)?;
-                apply(code.builtins.get(*builtin), &refs(&values)).map_err(|f| self.fail(code, n, f.kind, f.message, f.hint))?
+                apply(code.builtins.get(*builtin), &refs(&values))
+                    .map_err(|f| self.fail(code, n, f.kind, f.message, f.hint))?
             }
             Op::Array(items) => Value::from_elements(self.peek_all(code, peek, value, frame, items)?.into_vec()),
             Op::Record { names, values } => {

@@ -105,12 +105,9 @@ impl Graph {
     /// What the current update did to the score.
     pub fn weight(&self, prior: &ExactSum, likelihood: &ExactSum) -> Weight {
         let none = ExactSum::default();
-        let log_joint =
-            ExactSum::balance([&self.prior, &self.likelihood, &none], [prior, likelihood, &none]);
-        let log_weight = ExactSum::balance(
-            [&self.prior, &self.likelihood, &self.drawn],
-            [prior, likelihood, &self.undrawn],
-        );
+        let log_joint = ExactSum::balance([&self.prior, &self.likelihood, &none], [prior, likelihood, &none]);
+        let log_weight =
+            ExactSum::balance([&self.prior, &self.likelihood, &self.drawn], [prior, likelihood, &self.undrawn]);
         Weight {
             log_weight,
             log_joint,

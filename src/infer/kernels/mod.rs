@@ -6,12 +6,16 @@ mod elliptical;
 mod gibbs;
 mod hamiltonian;
 mod mh;
+pub(crate) mod own;
 mod slice;
+mod temper;
 
 pub use block::Block;
 pub use drift::Drift;
 pub use elliptical::Elliptical;
 pub use gibbs::Gibbs;
-pub use hamiltonian::{Hmc, Nuts};
+pub use hamiltonian::{Hmc, Nuts, Optimize};
 pub use mh::Mh;
+pub(crate) use own::Own;
 pub use slice::Slice;
+pub use temper::Temper;

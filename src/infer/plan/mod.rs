@@ -2,20 +2,23 @@
 
 mod warmup;
 
+use super::build::{build, is_constant};
 use super::draws::{DrawRow, KernelStats, Sink};
 use super::expr::{Scope, evaluate};
 use super::init::{StartError, start_of, starts};
-use super::kernel::{At, Kernel};
-use super::kernels::{Block, Drift, Elliptical, Gibbs, Hmc, Mh, Nuts, Slice};
+use super::kernel::{At, Kernel, Outcome};
+use super::kernels::own::proposes;
 use super::population::Population;
 use super::record::Recorder;
-use super::selection::{fail, scope, selector};
+use super::selection::{fail, selector};
 use crate::lang::code::Code;
 use crate::lang::error::RunError;
 use crate::lang::value::Value;
 use crate::rng::{Purpose, StreamKey};
-use crate::syntax::ast::{Arg, Expr, ExprKind, KStmt, KStmtKind, MixArm};
+use crate::syntax::ast::{Arg, Expr, ExprKind, KStmt, KStmtKind, KernelDecl, MixArm};
 use crate::trace::{Constraint, Draws, Limits, Selector, Trace};
+use rustc_hash::FxHashMap;
+use smallvec::SmallVec;
 use std::fmt;
 use std::sync::Arc;
 use std::sync::atomic::{AtomicBool, AtomicU64, Ordering};
@@ -118,11 +121,9 @@ enum Flow {
     End,
 }
 
-/// A kernel that has run: where it stands in the program, on what, and what it did. Kernels written alike are one, so that
-/// what is learnt in a warm-up serves the loops after it.
+/// A kernel that has run, what tells it from others, and what it did.
 struct Instance {
-    places: Vec<usize>,
-    selector: Selector,
+    signature: String,
     kernel: Box<dyn Kernel>,
     stats: KernelStats,
 }
@@ -136,6 +137,8 @@ pub(crate) struct Runner<'a> {
     trace: Trace,
     variables: Vec<(Arc<str>, Value)>,
     instances: Vec<Instance>,
+    /// By the place of a call that always means the same: its kernel.
+    places: FxHashMap<usize, usize>,
     recorder: Recorder,
     frozen: Selector,
     started: Instant,
@@ -179,6 +182,7 @@ pub(crate) fn run_chain(
         trace,
         variables: Vec::new(),
         instances: Vec::new(),
+        places: FxHashMap::default(),
         recorder: Recorder::new(code, plan),
         frozen: Selector::Nothing,
         started,
@@ -304,11 +308,7 @@ impl Runner<'_> {
             KStmtKind::Mix(arms) => self.mix(arms),
             KStmtKind::For { var, iter, body } => {
                 let over = self.value(iter)?;
-                let items: Vec<Value> = match &over {
-                    Value::Record(r) => r.keys().map(|k| Value::Str(Arc::clone(k))).collect(),
-                    v => (0..v.len().unwrap_or(0)).filter_map(|i| v.element(i)).collect(),
-                };
-                for item in items {
+                for item in over.passes() {
                     self.variables.push((Arc::clone(&var.node), item));
                     let flow = self.body(body);
                     self.variables.pop();
@@ -397,9 +397,13 @@ impl Runner<'_> {
     }
 
     fn mix(&mut self, arms: &[MixArm]) -> Result<Flow, ChainError> {
-        let mut weights = Vec::with_capacity(arms.len());
+        let mut weights: SmallVec<[f64; 8]> = SmallVec::new();
         for a in arms {
-            match self.value(&a.weight)? {
+            let weight = match a.weight.kind {
+                ExprKind::Num(w) => Value::Num(w),
+                _ => self.value(&a.weight)?,
+            };
+            match weight {
                 Value::Num(w) if w >= 0.0 && w.is_finite() => weights.push(w),
                 v => return Err(fail(a.weight.span, format!("a weight must be at least 0, got {v}")).into()),
             }
@@ -429,15 +433,61 @@ impl Runner<'_> {
             "anneal" => return self.anneal(e, args),
             _ => {}
         }
-        if self.code.builtins.find("", name).is_none() {
-            let message = format!("kernels that a program declares, such as `{name}`, cannot run yet in this version");
-            let mut e = fail(e.span, message);
-            e.hint = Some("write its statements where it is called".into());
-            return Err(e.into());
+        if let Some(k) = self.code.kernels.iter().find(|k| &*k.name.node == name && !proposes(&k.body)) {
+            return self.apply_declared(e, k, args);
         }
-        let Some(sel) = args.first() else {
-            return Err(fail(e.span, format!("`{name}` needs a selection of choices, e.g. @**")).into());
+        let place = e as *const Expr as usize;
+        let i = match self.places.get(&place) {
+            Some(i) => *i,
+            None => self.instance(e, place)?,
         };
+        let begun = Instant::now();
+        let mut flow = Flow::Next;
+        let outcome = match self.instances[i].kernel.sweep(&mut self.trace) {
+            None => self.step(i, 0)?,
+            Some(members) => {
+                let mut all = Outcome::default();
+                for member in 0..members {
+                    all.add(self.step(i, member)?);
+                    if self.is_over() {
+                        flow = Flow::End;
+                        break;
+                    }
+                }
+                all
+            }
+        };
+        if !self.in_warmup {
+            self.instances[i].stats.add(&outcome, begun.elapsed());
+        }
+        Ok(if self.is_over() { Flow::End } else { flow })
+    }
+
+    /// Applies a kernel that the program declares from other kernels.
+    fn apply_declared(&mut self, e: &Expr, k: &KernelDecl, args: &[Arg]) -> Result<Flow, ChainError> {
+        let depth = self.variables.len();
+        for (i, p) in k.params.iter().enumerate() {
+            let given = argument(args, i, &p.name.node).or(p.default.as_ref());
+            let given = given.ok_or_else(|| fail(e.span, format!("the argument `{}` is missing", p.name.node)))?;
+            let v = self.value(given)?;
+            self.variables.push((Arc::clone(&p.name.node), v));
+        }
+        let flow = self.body(&k.body);
+        self.variables.truncate(depth);
+        flow
+    }
+
+    /// One step of a kernel.
+    fn step(&mut self, i: usize, member: usize) -> Result<Outcome, ChainError> {
+        let at = At { member, ..self.at() };
+        let outcome = self.instances[i].kernel.step(&mut self.trace, &at)?;
+        self.step += 1;
+        self.progress.steps.fetch_add(1, Ordering::Relaxed);
+        Ok(outcome)
+    }
+
+    /// The kernel a call stands for: one that is known, or a new one.
+    fn instance(&mut self, e: &Expr, place: usize) -> Result<usize, ChainError> {
         let draws = self.predictive();
         let mut env = Scope {
             code: self.code,
@@ -447,79 +497,19 @@ impl Runner<'_> {
             started: self.started,
             steps: self.step,
         };
-        let mut scope = scope(&sel.value, &mut env)?;
-        if self.frozen != Selector::Nothing {
-            scope.selector = Selector::Minus(Box::new(scope.selector), Box::new(self.frozen.clone()));
-        }
-        let place = e as *const Expr as usize;
-        let mut known = self.instances.iter().position(|i| i.places.contains(&place) && i.selector == scope.selector);
-        if known.is_none() {
-            let label = self.label(e);
-            let alike = |i: &Instance| i.stats.name == label && i.selector == scope.selector;
-            known = self.instances.iter().position(alike);
-            if let Some(i) = known {
-                self.instances[i].places.push(place);
-            }
-        }
-        let i = match known {
+        let built = build(e, &self.frozen, &mut env)?;
+        let i = match self.instances.iter().position(|i| i.signature == built.signature) {
             Some(i) => i,
             None => {
-                let selector = scope.selector.clone();
-                let kernel: Box<dyn Kernel> = match name {
-                    "mh" => Box::new(Mh::new(scope)),
-                    "block" => Box::new(Block::new(scope)),
-                    "gibbs" => Box::new(Gibbs::new(scope)),
-                    "elliptical" => Box::new(Elliptical::new(scope)),
-                    "hmc" => Box::new(Hmc::new(scope, self.setting(args, "steps", 10, 10_000)?, None)),
-                    "mala" => Box::new(Hmc::new(scope, 1, None)),
-                    "nuts" => Box::new(Nuts::new(scope, self.setting(args, "max_depth", 10, 20)?)),
-                    "drift" => Box::new(Drift::new(scope, self.length(args, name, "scale")?)),
-                    "slice" => Box::new(Slice::new(scope, self.length(args, name, "width")?)),
-                    _ => {
-                        let message = format!("the kernel `{name}` is not available yet in this version");
-                        let mut e = fail(e.span, message);
-                        e.hint =
-                            Some("those that are: mh, block, drift, gibbs, elliptical, hmc, mala, nuts, slice".into());
-                        return Err(e.into());
-                    }
-                };
                 let stats = KernelStats { name: self.label(e), ..Default::default() };
-                self.instances.push(Instance { places: vec![place], selector, kernel, stats });
+                self.instances.push(Instance { signature: built.signature, kernel: built.kernel, stats });
                 self.instances.len() - 1
             }
         };
-        let at = self.at();
-        let begun = Instant::now();
-        let outcome = self.instances[i].kernel.step(&mut self.trace, &at)?;
-        let stats = &mut self.instances[i].stats;
-        if !self.in_warmup {
-            stats.proposals += u64::from(outcome.proposals);
-            stats.accepted += u64::from(outcome.accepted);
-            stats.failed += u64::from(outcome.failed);
-            stats.divergent += u64::from(outcome.divergent);
-            stats.seconds += begun.elapsed().as_secs_f64();
+        if is_constant(e) {
+            self.places.insert(place, i);
         }
-        self.step += 1;
-        self.progress.steps.fetch_add(1, Ordering::Relaxed);
-        Ok(if self.is_over() { Flow::End } else { Flow::Next })
-    }
-
-    /// A positive number that a kernel takes besides its selection, if it is given.
-    fn length(&mut self, args: &[Arg], kernel: &str, name: &str) -> Result<Option<f64>, Box<RunError>> {
-        let Some(e) = argument(args, 1, name) else { return Ok(None) };
-        match self.value(e)? {
-            Value::Num(s) if s > 0.0 => Ok(Some(s)),
-            v => Err(fail(e.span, format!("{kernel}: `{name}` must be positive, got {v}"))),
-        }
-    }
-
-    /// A whole number that a kernel takes besides its selection.
-    fn setting(&mut self, args: &[Arg], name: &str, default: u32, most: u32) -> Result<u32, Box<RunError>> {
-        let Some(e) = argument(args, 1, name) else { return Ok(default) };
-        match self.value(e)? {
-            Value::Num(x) if x >= 1.0 && x <= f64::from(most) && x == libm::trunc(x) => Ok(x as u32),
-            v => Err(fail(e.span, format!("`{name}` is a whole number from 1 to {most}, got {v}"))),
-        }
+        Ok(i)
     }
 
     /// The text of a kernel for tables.

@@ -11,7 +11,7 @@ const MONITORS: &str = "Monitors and reports";
 
 /// What this version checks and documents but cannot run.
 pub(super) const PLANNED: &[&str] =
-    &["knn", "delayed", "temper", "smc", "abc", "optimize", "marginal", "acceptance", "rhat", "ess", "snapshot"];
+    &["knn", "delayed", "smc", "abc", "marginal", "acceptance", "rhat", "ess", "snapshot"];
 
 const fn name(
     name: &'static str,
@@ -122,9 +122,13 @@ pub(super) const TABLE: &[Builtin] = &[
     name(
         "temper",
         KERNELS,
-        &[INNER, opt("levels", Type::Int, "6", "The number of temperatures.")],
+        &[
+            INNER,
+            opt("levels", Type::Int, "6", "The number of temperatures."),
+            opt("hottest", Type::Num, "0.01", "The lowest power of the likelihood; warm-up spaces the ladder."),
+        ],
         Type::Kernel,
-        "Replica exchange over powers of the likelihood.",
+        "Replica exchange over powers of the likelihood: each step moves every replica, then neighbours swap (Geyer 1991).",
     ),
     name(
         "smc",
@@ -160,6 +164,13 @@ pub(super) const TABLE: &[Builtin] = &[
         &[SEL],
         Type::Selection,
         "One of the selected choices, picked uniformly at each step; the ratio of their numbers is paid for.",
+    ),
+    name(
+        "each",
+        CHOICES,
+        &[SEL],
+        Type::Selection,
+        "Each of the selected choices in turn, in the program's order: a sweep of as many steps. For mh, gibbs and drift.",
     ),
     name(
         "init",

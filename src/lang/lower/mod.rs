@@ -93,8 +93,6 @@ pub struct Compiled {
     pub reports: Vec<Report>,
     /// Its exports.
     pub exports: Vec<Export>,
-    /// Its user kernels: checked; running them comes later.
-    pub kernels: Vec<KernelDecl>,
 }
 
 /// Lowers a loaded program. The text of `--set` values goes to `map` too.
@@ -134,14 +132,9 @@ pub fn compile(loaded: &Loaded, inputs: Inputs, map: &mut SourceMap) -> Result<C
         l.errors.dedup();
         return Err(l.errors);
     }
+    l.code.kernels = l.kernels.into_values().collect();
     l.code.finish();
-    Ok(Compiled {
-        code: Arc::new(l.code),
-        plans: l.plans,
-        reports: l.reports,
-        exports: l.exports,
-        kernels: l.kernels.into_values().collect(),
-    })
+    Ok(Compiled { code: Arc::new(l.code), plans: l.plans, reports: l.reports, exports: l.exports })
 }
 
 /// A named function whose body waits until all top-level names are known.

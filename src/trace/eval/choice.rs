@@ -64,7 +64,8 @@ impl Graph {
 
     /// Whether one of these operands changed in this update.
     fn any_changed(&self, frame: FrameId, operands: &[Operand]) -> bool {
-        let changed = |o: &Operand| self.resolve(frame, *o).is_some_and(|d| self.nodes[d as usize].changed == self.epoch);
+        let changed =
+            |o: &Operand| self.resolve(frame, *o).is_some_and(|d| self.nodes[d as usize].changed == self.epoch);
         operands.iter().any(changed)
     }
 

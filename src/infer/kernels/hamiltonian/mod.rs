@@ -8,10 +8,12 @@
 mod adapt;
 mod hmc;
 mod nuts;
+mod optimize;
 mod system;
 
 pub use hmc::Hmc;
 pub use nuts::Nuts;
+pub use optimize::Optimize;
 
 use adapt::Adaptation;
 use system::{Momentum, Point, System};

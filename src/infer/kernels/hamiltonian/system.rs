@@ -73,7 +73,7 @@ impl<'a> System<'a> {
     }
 
     /// Goes to a place: its log density, and with `force` its gradient. `None` where there is none.
-    fn go(&mut self, y: Vec<f64>, force: bool) -> TraceResult<Option<Point>> {
+    pub fn go(&mut self, y: Vec<f64>, force: bool) -> TraceResult<Option<Point>> {
         if y.iter().any(|x| !x.is_finite()) {
             return Ok(None);
         }

@@ -1,0 +1,104 @@
+//! Runs one model of a side-by-side benchmark of probabilistic languages and writes what it took.
+//!
+//!     cargo run --release --example peer -- DATA.json OUT.json MODEL N BUDGET_S SEED
+//!
+//! The models are the programs in `benches/peers`; DATA holds the data sets by model (and size, where there are several). OUT gets
+//! the time at which sampling could start, the number of transitions after warm-up, the processor time they took on their one
+//! thread, and the draws.
+
+use pcadlang::infer::{RunOptions, Watch};
+use pcadlang::lang::value::Value;
+use pcadlang::trace::{Draws, Trace};
+use pcadlang::{Model, Program};
+use serde_json::{Value as Json, json};
+use std::error::Error;
+use std::sync::Arc;
+use std::sync::Mutex;
+use std::time::{Duration, SystemTime, UNIX_EPOCH};
+
+/// A model: its program, what it is given, and the names of what it collects.
+const MODELS: &[(&str, &str, &[&str])] = &[
+    ("coin", include_str!("../benches/peers/coin.pcad"), &["p"]),
+    ("linreg", include_str!("../benches/peers/linreg.pcad"), &["slope", "intercept", "log_noise"]),
+    ("hmm", include_str!("../benches/peers/hmm.pcad"), &["z"]),
+    ("gmm", include_str!("../benches/peers/gmm.pcad"), &["mu0", "mu1", "mu2"]),
+    ("schools", include_str!("../benches/peers/schools.pcad"), &["mu", "tau"]),
+    ("gp", include_str!("../benches/peers/gp.pcad"), &["log_ls", "log_amp", "log_noise"]),
+    ("tree", include_str!("../benches/peers/tree.pcad"), &["leaves"]),
+];
+
+/// The first and the last draw seen: processor time and steps done.
+#[derive(Debug, Default)]
+struct Clock(Mutex<Vec<(f64, u64)>>);
+
+impl Watch for Clock {
+    fn draw(&self, _chain: u32, _trace: &mut Trace, draws: Draws) {
+        let Ok(mut seen) = self.0.lock() else { return };
+        // Reading the clock costs more than a small step, so not at every draw.
+        seen.push((f64::NAN, draws.step));
+        let n = seen.len();
+        if n == 1 || n.is_multiple_of(64) {
+            seen[n - 1].0 = processor_seconds();
+        }
+    }
+}
+
+/// Processor time of this thread.
+fn processor_seconds() -> f64 {
+    let s = std::fs::read_to_string("/proc/thread-self/schedstat").unwrap_or_default();
+    s.split_whitespace().next().and_then(|x| x.parse::<f64>().ok()).unwrap_or(f64::NAN) / 1e9
+}
+
+fn value(j: &Json) -> Value {
+    match j {
+        Json::Number(x) => Value::Num(x.as_f64().unwrap_or(f64::NAN)),
+        Json::Array(xs) => Value::from_elements(xs.iter().map(value).collect()),
+        _ => Value::Unit,
+    }
+}
+
+fn compile(text: &str, data: &Json) -> Result<Model, Box<dyn Error>> {
+    let mut program = Program::parse(text)?;
+    for item in program.interface().data {
+        let given = data.get(&item.name).ok_or_else(|| format!("the data have no `{}`", item.name))?;
+        program = program.observe(&item.name, value(given));
+    }
+    Ok(program.compile()?)
+}
+
+fn main() -> Result<(), Box<dyn Error>> {
+    let args: Vec<String> = std::env::args().skip(1).collect();
+    let [data, out, name, n, budget, seed] = &args[..] else {
+        return Err("usage: peer DATA.json OUT.json MODEL N BUDGET_S SEED".into());
+    };
+    let data: Json = serde_json::from_str(&std::fs::read_to_string(data)?)?;
+    let (_, text, names) = MODELS.iter().find(|(m, ..)| m == name).ok_or_else(|| format!("no model `{name}`"))?;
+    let given = &data[name.as_str()];
+    let model = compile(text, given.get(n).unwrap_or(given))?;
+    let budget: f64 = budget.parse()?;
+    let clock = Arc::new(Clock::default());
+    let t_ready = SystemTime::now().duration_since(UNIX_EPOCH)?.as_secs_f64();
+    let options = RunOptions {
+        seed: seed.parse()?,
+        time: Some(Duration::from_secs_f64(budget)),
+        watch: Some(Arc::clone(&clock) as Arc<dyn Watch>),
+        ..RunOptions::default()
+    };
+    let posterior = model.run(&options, 1, 1)?;
+    let seen = clock.0.lock().map_err(|_| "the clock was lost")?;
+    let timed: Vec<usize> = (0..seen.len()).filter(|i| !seen[*i].0.is_nan()).collect();
+    let (Some(first), Some(last)) = (timed.first(), timed.last()) else { return Err("no draws".into()) };
+    let mut draws = serde_json::Map::new();
+    for (name, q) in names.iter().zip(posterior.scalars()) {
+        draws.insert((*name).to_owned(), json!([q.1[first + 1..=*last]]));
+    }
+    let result = json!({
+        "t_ready": t_ready,
+        "transitions": seen[*last].1 - seen[*first].1,
+        "sampling_cpu_s": seen[*last].0 - seen[*first].0,
+        "unit": "one step of a kernel: one choice updated, or the selected ones together",
+        "draws": draws,
+    });
+    std::fs::write(out, result.to_string())?;
+    Ok(())
+}

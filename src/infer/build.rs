@@ -1,0 +1,124 @@
+//! From the calls people write in inference blocks to kernels.
+
+use super::expr::{Scope, evaluate};
+use super::kernel::Kernel;
+use super::kernels::{Block, Drift, Elliptical, Gibbs, Hmc, Mh, Nuts, Optimize, Own, Slice, Temper};
+use super::plan::{argument, call};
+use super::selection::{fail, scope};
+use crate::lang::error::RunError;
+use crate::lang::value::Value;
+use crate::syntax::ast::{Address, Arg, Expr, ExprKind, Key};
+use crate::syntax::print_expr;
+use crate::trace::Selector;
+use std::sync::Arc;
+
+/// A kernel, and what tells it from others: calls written alike that mean the same choices are one kernel, so that what is
+/// learnt in a warm-up serves the loops after it.
+pub(super) struct Built {
+    pub kernel: Box<dyn Kernel>,
+    pub signature: String,
+}
+
+/// Builds the kernel of a call. Choices that the program froze are left out.
+///
+/// # Errors
+/// What is wrong with it, at its place.
+pub(super) fn build(e: &Expr, frozen: &Selector, env: &mut Scope) -> Result<Built, Box<RunError>> {
+    let Some((name, args)) = call(e) else {
+        return Err(fail(e.span, "a kernel such as mh(one(@**)) was expected".into()));
+    };
+    if let Some(k) = env.code.kernels.iter().find(|k| &*k.name.node == name) {
+        let code = Arc::clone(env.code);
+        let mut arguments = Vec::with_capacity(k.params.len());
+        for (i, p) in k.params.iter().enumerate() {
+            let given = argument(args, i, &p.name.node).or(p.default.as_ref());
+            let given = given.ok_or_else(|| fail(e.span, format!("the argument `{}` is missing", p.name.node)))?;
+            arguments.push((Arc::clone(&p.name.node), evaluate(given, env)?));
+        }
+        let signature = format!("{name}{arguments:?}");
+        return Ok(Built { kernel: Box::new(Own::new(code, k.clone(), arguments)), signature });
+    }
+    let Some(first) = args.first() else {
+        return Err(fail(e.span, format!("`{name}` needs a selection of choices, e.g. @**")));
+    };
+    if name == "temper" {
+        let levels = whole(argument(args, 1, "levels"), "levels", 6, 2, 1000, env)?;
+        let hottest = positive(argument(args, 2, "hottest"), name, "hottest", env)?.unwrap_or(0.01);
+        let mut inner = Vec::with_capacity(levels as usize);
+        for _ in 0..levels {
+            inner.push(build(&first.value, frozen, env)?);
+        }
+        let signature = format!("temper({}, {levels}, {hottest})", inner[0].signature);
+        let kernel = Temper::new(inner.into_iter().map(|b| b.kernel).collect(), hottest.min(1.0));
+        return Ok(Built { kernel: Box::new(kernel), signature });
+    }
+    let mut scope = scope(&first.value, env)?;
+    if *frozen != Selector::Nothing {
+        scope.selector = Selector::Minus(Box::new(scope.selector), Box::new(frozen.clone()));
+    }
+    let signature = format!("{} {scope:?}", print_expr(e));
+    let kernel: Box<dyn Kernel> = match name {
+        "mh" => Box::new(Mh::new(scope)),
+        "block" => Box::new(Block::new(scope)),
+        "gibbs" => Box::new(Gibbs::new(scope)),
+        "elliptical" => Box::new(Elliptical::new(scope)),
+        "hmc" => Box::new(Hmc::new(scope, whole(argument(args, 1, "steps"), "steps", 10, 1, 10_000, env)?, None)),
+        "mala" => Box::new(Hmc::new(scope, 1, None)),
+        "nuts" => Box::new(Nuts::new(scope, whole(argument(args, 1, "max_depth"), "max_depth", 10, 1, 20, env)?)),
+        "drift" => Box::new(Drift::new(scope, positive(argument(args, 1, "scale"), name, "scale", env)?)),
+        "slice" => Box::new(Slice::new(scope, positive(argument(args, 1, "width"), name, "width", env)?)),
+        "optimize" => {
+            Box::new(Optimize::new(scope, whole(argument(args, 1, "steps"), "steps", 100, 1, 1_000_000, env)?))
+        }
+        _ => {
+            let mut e = fail(e.span, format!("the kernel `{name}` is not available yet in this version"));
+            e.hint = Some(format!("those that are: {AVAILABLE}"));
+            return Err(e);
+        }
+    };
+    Ok(Built { kernel, signature })
+}
+
+const AVAILABLE: &str = "mh, block, drift, gibbs, elliptical, hmc, mala, nuts, slice, temper, optimize";
+
+/// A positive number that a kernel takes besides its selection, if it is given.
+fn positive(e: Option<&Expr>, kernel: &str, name: &str, env: &mut Scope) -> Result<Option<f64>, Box<RunError>> {
+    let Some(e) = e else { return Ok(None) };
+    match evaluate(e, env)? {
+        Value::Num(s) if s > 0.0 => Ok(Some(s)),
+        v => Err(fail(e.span, format!("{kernel}: `{name}` must be positive, got {v}"))),
+    }
+}
+
+/// A whole number that a kernel takes besides its selection.
+fn whole(
+    e: Option<&Expr>,
+    name: &str,
+    default: u32,
+    least: u32,
+    most: u32,
+    env: &mut Scope,
+) -> Result<u32, Box<RunError>> {
+    let Some(e) = e else { return Ok(default) };
+    match evaluate(e, env)? {
+        Value::Num(x) if x >= f64::from(least) && x <= f64::from(most) && x == libm::trunc(x) => Ok(x as u32),
+        v => Err(fail(e.span, format!("`{name}` is a whole number from {least} to {most}, got {v}"))),
+    }
+}
+
+/// Whether a call means the same whenever it is reached: it reads no names.
+pub(super) fn is_constant(e: &Expr) -> bool {
+    let arguments = |args: &[Arg]| args.iter().all(|a| is_constant(&a.value));
+    match &e.kind {
+        ExprKind::Num(_) | ExprKind::Str(_) | ExprKind::Bool(_) | ExprKind::TagSel { .. } => true,
+        ExprKind::Address(a) => has_constant_keys(a),
+        ExprKind::Call { args, .. } => arguments(args),
+        ExprKind::Unary { expr, .. } => is_constant(expr),
+        ExprKind::Binary { left, right, .. } => is_constant(left) && is_constant(right),
+        _ => false,
+    }
+}
+
+fn has_constant_keys(a: &Address) -> bool {
+    a.segments.iter().flat_map(|s| &s.keys).all(|k| !matches!(k, Key::Expr(_)))
+}

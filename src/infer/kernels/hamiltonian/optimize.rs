@@ -1,0 +1,122 @@
+//! `optimize(sel)`: climbs to a mode by L-BFGS (Nocedal & Wright 2006, algorithm 7.4) with a backtracking line search.
+//!
+//! Not a sampler: for a start, or an answer in a hurry. The mode is that of the density in the unconstrained space, where the
+//! other kernels of this family move.
+
+use super::{Point, System};
+use crate::infer::kernel::{At, Kernel, Outcome, Registered, Scope};
+use crate::trace::{Trace, TraceResult};
+use std::collections::VecDeque;
+
+/// How many of the last steps the curvature is taken from.
+const MEMORY: usize = 8;
+
+/// Gradient ascent with curvature.
+#[derive(Clone, Debug)]
+pub struct Optimize {
+    scope: Registered,
+    steps: u32,
+}
+
+/// A step and the change of the gradient over it.
+struct Pair {
+    step: Vec<f64>,
+    change: Vec<f64>,
+}
+
+impl Optimize {
+    /// The kernel for these choices, with at most so many steps.
+    pub fn new(scope: Scope, steps: u32) -> Self {
+        Optimize { scope: Registered::new(scope), steps }
+    }
+}
+
+fn dot(a: &[f64], b: &[f64]) -> f64 {
+    a.iter().zip(b).map(|(a, b)| a * b).sum()
+}
+
+/// The direction of ascent: the gradient times the inverse curvature of the last steps.
+fn direction(gradient: &[f64], past: &VecDeque<Pair>) -> Vec<f64> {
+    let mut q = gradient.to_vec();
+    let mut shares = Vec::with_capacity(past.len());
+    for p in past.iter().rev() {
+        let share = dot(&p.step, &q) / dot(&p.step, &p.change);
+        q.iter_mut().zip(&p.change).for_each(|(q, y)| *q -= share * y);
+        shares.push(share);
+    }
+    if let Some(p) = past.back() {
+        let scale = dot(&p.step, &p.change) / dot(&p.change, &p.change);
+        q.iter_mut().for_each(|q| *q *= scale);
+    } else {
+        let length = dot(gradient, gradient).sqrt().max(1.0);
+        q.iter_mut().for_each(|q| *q /= length);
+    }
+    for (p, share) in past.iter().zip(shares.iter().rev()) {
+        let back = dot(&p.change, &q) / dot(&p.step, &p.change);
+        q.iter_mut().zip(&p.step).for_each(|(q, s)| *q += (share - back) * s);
+    }
+    q
+}
+
+/// A point up along a direction that gains enough (Armijo's rule), trying ever shorter steps.
+fn climb(system: &mut System, from: &Point, along: &[f64]) -> TraceResult<Option<Point>> {
+    let slope = dot(along, &from.gradient);
+    let mut step = 1.0;
+    for _ in 0..40 {
+        let y = from.y.iter().zip(along).map(|(y, d)| y + step * d).collect();
+        if let Some(to) = system.go(y, true)?
+            && to.log_density >= from.log_density + 1e-4 * step * slope
+        {
+            return Ok(Some(to));
+        }
+        step *= 0.5;
+    }
+    Ok(None)
+}
+
+impl Kernel for Optimize {
+    fn name(&self) -> String {
+        "optimize".into()
+    }
+
+    fn step(&mut self, trace: &mut Trace, at: &At) -> TraceResult<Outcome> {
+        let mut rng = at.stream();
+        let (targets, _) = self.scope.members(trace, at, &mut rng);
+        let Some((mut system, begun)) = System::begin(trace, at, &targets)? else { return Ok(Outcome::default()) };
+        let mut here = begun.clone();
+        let mut past: VecDeque<Pair> = VecDeque::new();
+        for _ in 0..self.steps {
+            let mut along = direction(&here.gradient, &past);
+            if !(dot(&along, &here.gradient) > 0.0) {
+                past.clear();
+                along = direction(&here.gradient, &past);
+            }
+            let Some(next) = climb(&mut system, &here, &along)? else {
+                if past.is_empty() {
+                    break;
+                }
+                past.clear();
+                continue;
+            };
+            let step: Vec<f64> = next.y.iter().zip(&here.y).map(|(a, b)| a - b).collect();
+            let change: Vec<f64> = here.gradient.iter().zip(&next.gradient).map(|(a, b)| a - b).collect();
+            let gain = next.log_density - here.log_density;
+            if dot(&step, &change) > 1e-12 * dot(&change, &change) {
+                past.push_back(Pair { step, change });
+                if past.len() > MEMORY {
+                    past.pop_front();
+                }
+            }
+            here = next;
+            let flat = here.gradient.iter().all(|g| g.abs() < 1e-7);
+            if flat || gain.abs() <= 1e-13 * (1.0 + here.log_density.abs()) {
+                break;
+            }
+        }
+        let moved = here.log_density > begun.log_density && system.settle(Some(&here))?;
+        if !moved {
+            trace.rollback();
+        }
+        Ok(Outcome::one(moved))
+    }
+}

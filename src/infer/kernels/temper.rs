@@ -1,0 +1,84 @@
+//! `temper(move)`: replica exchange over powers of the likelihood (Geyer 1991; Hukushima & Nemoto 1996).
+//!
+//! Beside the chain's own state there are replicas that see the likelihood raised to lower powers, so that they cross between
+//! modes. Each step moves every replica by the kernel inside, then neighbours swap states with the Metropolis ratio, the even
+//! pairs and the odd ones in turn (Okabe et al. 2001). In warm-up the ladder is spaced so that neighbours swap about as often
+//! everywhere (Miasojedow, Moulines & Vihola 2013).
+
+use crate::infer::kernel::{At, Kernel, Outcome, accepts, inner_step};
+use crate::trace::{Trace, TraceResult};
+
+/// The rate of swaps aimed at: the best one for many temperatures (Kone & Kofke 2005).
+const AIM: f64 = 0.234;
+
+/// Replica exchange around a kernel.
+pub struct Temper {
+    /// The kernel of each level, the chain's own first.
+    kernels: Vec<Box<dyn Kernel>>,
+    /// The states of the levels after the first.
+    replicas: Vec<Trace>,
+    /// The logarithms of the gaps between the log powers of neighbours.
+    gaps: Vec<f64>,
+    rounds: u64,
+}
+
+impl Temper {
+    /// One level a kernel; the powers fall geometrically from 1 to `hottest` until warm-up finds better ones.
+    pub fn new(kernels: Vec<Box<dyn Kernel>>, hottest: f64) -> Self {
+        let pairs = kernels.len().saturating_sub(1);
+        let gap = (-libm::log(hottest) / pairs.max(1) as f64).max(1e-6);
+        Temper { kernels, replicas: Vec::new(), gaps: vec![libm::log(gap); pairs], rounds: 0 }
+    }
+
+    /// The powers of the levels, the chain's own first.
+    pub fn powers(&self) -> Vec<f64> {
+        let mut log = 0.0;
+        let lower = self.gaps.iter().map(|g| {
+            log -= libm::exp(*g);
+            libm::exp(log)
+        });
+        std::iter::once(1.0).chain(lower).collect()
+    }
+
+    /// Learns from the probability of a swap.
+    fn adapt(&mut self, pair: usize, probability: f64) {
+        let gain = libm::pow(self.rounds as f64 / 2.0 + 1.0, -0.6).max(0.01);
+        self.gaps[pair] = (self.gaps[pair] + gain * (probability - AIM)).clamp(-12.0, 4.0);
+    }
+}
+
+impl Kernel for Temper {
+    fn name(&self) -> String {
+        "temper".into()
+    }
+
+    fn step(&mut self, trace: &mut Trace, at: &At) -> TraceResult<Outcome> {
+        let pairs = self.gaps.len();
+        while self.replicas.len() < pairs {
+            self.replicas.push(trace.clone());
+        }
+        let powers = self.powers();
+        for (level, kernel) in self.kernels.iter_mut().enumerate() {
+            let state = if level == 0 { &mut *trace } else { &mut self.replicas[level - 1] };
+            inner_step(&mut **kernel, state, &At { power: at.power * powers[level], ..at.within(level as u64) })?;
+        }
+        let mut rng = at.stream();
+        let mut outcome = Outcome::default();
+        for pair in ((self.rounds % 2) as usize..pairs).step_by(2) {
+            let (low, high) = self.replicas.split_at_mut(pair);
+            let (colder, hotter) = (low.last_mut().unwrap_or(&mut *trace), &mut high[0]);
+            let rise = hotter.log_likelihood() - colder.log_likelihood();
+            let ratio = at.power * (powers[pair] - powers[pair + 1]) * rise;
+            let swapped = accepts(ratio, &mut rng);
+            if swapped {
+                std::mem::swap(colder, hotter);
+            }
+            outcome.add(Outcome::one(swapped));
+            if at.adapting {
+                self.adapt(pair, if ratio.is_nan() { 0.0 } else { libm::exp(ratio.min(0.0)) });
+            }
+        }
+        self.rounds += 1;
+        Ok(outcome)
+    }
+}
