@@ -89,7 +89,8 @@ fn main() -> Result<(), Box<dyn Error>> {
     let timed: Vec<usize> = (0..seen.len()).filter(|i| !seen[*i].0.is_nan()).collect();
     let (Some(first), Some(last)) = (timed.first(), timed.last()) else { return Err("no draws".into()) };
     let mut draws = serde_json::Map::new();
-    for (name, q) in names.iter().zip(posterior.scalars()) {
+    let collected = posterior.scalars().into_iter().filter(|(name, _)| !name.starts_with("log_joint"));
+    for (name, q) in names.iter().zip(collected) {
         draws.insert((*name).to_owned(), json!([q.1[first + 1..=*last]]));
     }
     let result = json!({

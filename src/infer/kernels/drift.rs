@@ -5,8 +5,10 @@
 //! ratio. That is right also for a support that depends on another choice of the block. A finite discrete choice moves to
 //! another of its values, an unbounded integer by a few units.
 
+use super::shape::{MOST, Shape};
 use crate::dist::{Datum, Support};
 use crate::infer::kernel::{At, Kernel, Outcome, Pick, Registered, Scope, decide, recoverable};
+use crate::lang::key::mix;
 use crate::rng::Stream;
 use crate::trace::{Change, Target, Trace, TraceResult};
 use rustc_hash::FxHashMap;
@@ -25,6 +27,8 @@ pub struct Drift {
     scales: FxHashMap<u64, Scale>,
     /// By address: the spread of each choice in the unconstrained space, for joint moves.
     spreads: FxHashMap<u64, Spread>,
+    /// By the hash of their addresses: the shape of choices that move together.
+    shapes: FxHashMap<u64, Shape>,
 }
 
 #[derive(Clone, Copy, Debug)]
@@ -99,14 +103,27 @@ impl Drift {
             adaptive: scale.is_none(),
             scales: FxHashMap::default(),
             spreads: FxHashMap::default(),
+            shapes: FxHashMap::default(),
         }
     }
 
-    fn propose_one(&self, trace: &Trace, t: Target, scale: f64, rng: &mut Stream) -> Option<Move> {
-        let Some((mut y, old_term)) = trace.free(t) else {
+    /// A move of a choice that is at `free` in the unconstrained space, along `step` where that is given.
+    fn propose_one(
+        trace: &Trace,
+        t: Target,
+        free: Option<(Vec<f64>, f64)>,
+        step: Option<&[f64]>,
+        scale: f64,
+        rng: &mut Stream,
+    ) -> Option<Move> {
+        let Some((mut y, old_term)) = free else {
             return discrete_move(&trace.dist(t)?.stored_support(), &trace.stored(t)?, scale, rng);
         };
         let dimensions = y.len();
+        if let Some(step) = step {
+            y.iter_mut().zip(step).for_each(|(y, d)| *y += scale * d);
+            return Some(Move { change: Some(Change::Free(y)), old_term, finite: None, dimensions });
+        }
         // Now and then a much longer or shorter step: chains leave narrow places and settle in wide ones. The length does not
         // depend on the state, so the proposal stays symmetric.
         let scale = scale * libm::exp(rng.standard_normal());
@@ -174,10 +191,24 @@ impl Kernel for Drift {
         let joint = targets.len() > 1;
         let mut changes = Vec::with_capacity(targets.len());
         let mut moves = Vec::with_capacity(targets.len());
-        let mut dimensions = 0;
-        for t in &targets {
-            let spread = if joint { self.spreads.get(&trace.address_hash(*t)).map_or(1.0, Spread::sd) } else { 1.0 };
-            let Some(m) = self.propose_one(trace, *t, scale * spread, &mut rng) else { continue };
+        let (mut dimensions, mut dimensions_before) = (0, 0);
+        let frees: Vec<_> = targets.iter().map(|t| trace.free(*t)).collect();
+        let shape = joint.then(|| shape_key(trace, &targets, &frees));
+        let along = shape.and_then(|k| self.shapes.get(&k)).and_then(|s| s.step(&mut rng));
+        // Of uneven length, independent of the state.
+        let length = if along.is_some() { libm::exp(0.5 * rng.standard_normal()) } else { 1.0 };
+        for (t, free) in targets.iter().zip(frees) {
+            let size = free.as_ref().map_or(0, |(y, _)| y.len());
+            let step = along.as_ref().map(|a| &a[dimensions_before..dimensions_before + size]);
+            dimensions_before += size;
+            let spread = if along.is_some() {
+                length
+            } else if joint {
+                self.spreads.get(&trace.address_hash(*t)).map_or(1.0, Spread::sd)
+            } else {
+                1.0
+            };
+            let Some(m) = Self::propose_one(trace, *t, free, step, scale * spread, &mut rng) else { continue };
             dimensions += m.dimensions;
             changes.extend(m.change.clone().map(|c| (*t, c)));
             moves.push((*t, m));
@@ -202,12 +233,36 @@ impl Kernel for Drift {
             if joint {
                 self.learn_spreads(trace, &targets);
             }
+            // An annealed posterior has another shape.
+            if joint && at.power == 1.0 {
+                self.learn_shape(trace);
+            }
         }
         Ok(outcome)
     }
 }
 
+/// What tells the shapes of different sets of choices apart.
+fn shape_key(trace: &Trace, targets: &[Target], frees: &[Option<(Vec<f64>, f64)>]) -> u64 {
+    let one = |h, (t, free): (&Target, &Option<(Vec<f64>, f64)>)| {
+        mix(mix(h, trace.address_hash(*t)), free.as_ref().map_or(0, |(y, _)| y.len() as u64))
+    };
+    targets.iter().zip(frees).fold(0, one)
+}
+
 impl Drift {
+    /// Learns the shape of what moves together, from where the chain is now.
+    fn learn_shape(&mut self, trace: &mut Trace) {
+        let selection = self.scope.selection(trace);
+        let targets = trace.targets(selection);
+        let frees: Vec<_> = targets.iter().map(|t| trace.free(*t)).collect();
+        let y: Vec<f64> = frees.iter().flatten().flat_map(|(y, _)| y.iter().copied()).collect();
+        if (2..=MOST).contains(&y.len()) {
+            let key = shape_key(trace, targets, &frees);
+            self.shapes.entry(key).or_insert_with(|| Shape::new(y.len())).add(&y);
+        }
+    }
+
     fn learn_spreads(&mut self, trace: &Trace, targets: &[Target]) {
         for t in targets {
             let Some((y, _)) = trace.free(*t) else { continue };

@@ -7,6 +7,7 @@ mod gibbs;
 mod hamiltonian;
 mod mh;
 pub(crate) mod own;
+mod shape;
 mod slice;
 mod temper;
 

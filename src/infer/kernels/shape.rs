@@ -1,0 +1,90 @@
+//! The shape of a posterior as a random walk learns it in warm-up: a covariance in the unconstrained space (Haario, Saksman &
+//! Tamminen 2001), from windows of states that double in length, so that the way to the posterior is forgotten.
+
+use crate::rng::Stream;
+use nalgebra::DMatrix;
+
+/// The first window.
+const WINDOW: u32 = 100;
+/// The most coordinates whose covariances are worth learning.
+pub(super) const MOST: usize = 64;
+
+/// A covariance being learnt, and the factor of the last one.
+#[derive(Clone, Debug)]
+pub(super) struct Shape {
+    mean: Vec<f64>,
+    /// Sums of products of deviations, the lower triangle by rows.
+    products: Vec<f64>,
+    count: u32,
+    window: u32,
+    factor: Option<DMatrix<f64>>,
+}
+
+impl Shape {
+    pub fn new(dimensions: usize) -> Self {
+        let window = WINDOW.max(10 * dimensions as u32);
+        let products = vec![0.0; dimensions * (dimensions + 1) / 2];
+        Shape { mean: vec![0.0; dimensions], products, count: 0, window, factor: None }
+    }
+
+    /// Learns from a state.
+    pub fn add(&mut self, y: &[f64]) {
+        self.count += 1;
+        let n = f64::from(self.count);
+        let before: Vec<f64> = y.iter().zip(&self.mean).map(|(y, m)| y - m).collect();
+        self.mean.iter_mut().zip(&before).for_each(|(m, d)| *m += d / n);
+        let mut entries = self.products.iter_mut();
+        for (i, d) in before.iter().enumerate() {
+            let after = y[..=i].iter().zip(&self.mean);
+            after.zip(entries.by_ref()).for_each(|((y, m), p)| *p += d * (y - m));
+        }
+        if self.count == self.window {
+            self.close();
+        }
+    }
+
+    /// Ends a window: its covariance, drawn a little towards its diagonal, is the shape from now on.
+    fn close(&mut self) {
+        let (d, n) = (self.mean.len(), f64::from(self.count));
+        let covariance = DMatrix::from_fn(d, d, |i, j| {
+            let (i, j) = (i.max(j), i.min(j));
+            let c = self.products[i * (i + 1) / 2 + j] / (n - 1.0);
+            if i == j { c * (1.0 + 1e-3) + 1e-10 } else { c * (n / (n + 5.0)) }
+        });
+        if let Some(cholesky) = covariance.cholesky() {
+            self.factor = Some(cholesky.unpack());
+        }
+        let longer = self.window.saturating_mul(2);
+        *self = Shape { window: longer, factor: self.factor.take(), ..Shape::new(d) };
+    }
+
+    /// A step drawn in this shape, of unit scale; `None` before the first window has ended.
+    pub fn step(&self, rng: &mut Stream) -> Option<Vec<f64>> {
+        let factor = self.factor.as_ref()?;
+        let z: Vec<f64> = (0..factor.nrows()).map(|_| rng.standard_normal()).collect();
+        Some((0..z.len()).map(|i| (0..=i).map(|j| factor[(i, j)] * z[j]).sum()).collect())
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+    use crate::rng::{Purpose, StreamKey};
+
+    #[test]
+    fn steps_have_the_covariance_of_the_states() {
+        let mut rng = StreamKey::new(1, 0, Purpose::KERNEL).stream(0, 0, 0);
+        let mut shape = Shape::new(2);
+        assert!(shape.step(&mut rng).is_none());
+        // Correlation 0.95, standard deviations 1 and 3, far from the origin; windows of 100, 200, … 12,800 states.
+        for _ in 0..25_500 {
+            let (a, b) = (rng.standard_normal(), rng.standard_normal());
+            shape.add(&[50.0 + a, 3.0 * (0.95 * a + (1.0 - 0.95f64 * 0.95).sqrt() * b)]);
+        }
+        let steps: Vec<Vec<f64>> = (0..40_000).filter_map(|_| shape.step(&mut rng)).collect();
+        let moment = |i: usize, j: usize| steps.iter().map(|s| s[i] * s[j]).sum::<f64>() / steps.len() as f64;
+        assert!((moment(0, 0) - 1.0).abs() < 0.05, "{}", moment(0, 0));
+        assert!((moment(1, 1) - 9.0).abs() < 0.45, "{}", moment(1, 1));
+        assert!((moment(0, 1) - 2.85).abs() < 0.15, "{}", moment(0, 1));
+    }
+}
