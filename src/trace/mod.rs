@@ -160,7 +160,7 @@ impl Trace {
     pub fn restore(&mut self, saved: &[(u64, Constraint)], draws: Draws) -> TraceResult<()> {
         self.rollback();
         let values: rustc_hash::FxHashMap<u64, &Constraint> = saved.iter().map(|(h, c)| (*h, c)).collect();
-        let here = self.graph.choices.selections[0].targets();
+        let here = self.all_targets();
         let changes: Vec<_> = here
             .iter()
             .filter_map(|t| match values.get(&self.address_hash(*t)) {
@@ -207,12 +207,13 @@ impl Trace {
         let selection = self.select(selector);
         let mut sum = crate::num::ExactSum::default();
         for t in self.targets(selection).to_vec() {
-            sum.add(self.target_score(t));
+            sum.add(self.score_of(t));
         }
         sum.value()
     }
 
-    fn target_score(&self, t: Target) -> f64 {
+    /// The log density of a choice under its prior given the rest, in the present state, also that of a pending proposal.
+    pub fn score_of(&self, t: Target) -> f64 {
         let node = &self.graph.nodes[t.node as usize];
         match node.side.as_deref() {
             Some(node::Side::Choice(c)) if t.element != NONE => c.scores[t.element as usize],
@@ -227,7 +228,7 @@ impl Trace {
     /// # Errors
     /// An operation between a choice and the score of which no derivative is known.
     pub fn gradient(&self, targets: &[Target], power: f64, out: &mut Vec<f64>) -> TraceResult<()> {
-        let mut scored: Vec<u32> = self.graph.choices.selections[0].targets().iter().map(|t| t.node).collect();
+        let mut scored: Vec<u32> = self.all_targets().iter().map(|t| t.node).collect();
         scored.dedup();
         scored.extend(self.scored_nodes());
         self.graph.gradient(&self.code, targets, &scored, power, out)
@@ -242,6 +243,11 @@ impl Trace {
     /// The choices a selection now has.
     pub fn targets(&self, selection: Selection) -> &[Target] {
         self.graph.choices.selections[selection.0 as usize].targets()
+    }
+
+    /// All active choices, in the order of the hashes of their addresses.
+    pub fn all_targets(&self) -> &[Target] {
+        self.graph.choices.selections[0].targets()
     }
 
     /// The choice at an address, if it is active. An element of a choice has the element's index as last key.
@@ -315,7 +321,7 @@ impl Trace {
 
     /// How many choices (elements counted one by one) are active.
     pub fn choice_count(&self) -> usize {
-        self.graph.choices.selections[0].targets().len()
+        self.all_targets().len()
     }
 
     /// The values of expressions of the top level; what they need and no observation asks for is drawn from its prior
@@ -324,12 +330,26 @@ impl Trace {
     /// # Errors
     /// What goes wrong while they are evaluated.
     pub fn query(&mut self, operands: &[Operand], draws: Draws) -> TraceResult<Vec<Value>> {
+        self.imagine(operands, draws, |_, values| values)
+    }
+
+    /// As [`Trace::query`], and shows the trace with the choices that were drawn for it, before they are forgotten.
+    ///
+    /// # Errors
+    /// As [`Trace::query`].
+    pub fn imagine<T>(
+        &mut self,
+        operands: &[Operand],
+        draws: Draws,
+        look: impl FnOnce(&Trace, Vec<Value>) -> T,
+    ) -> TraceResult<T> {
         self.rollback();
         let before = self.graph.begin();
         self.graph.draws = draws;
         self.graph.before = Some(before.clone());
         let result = self.graph.query(&self.code, operands);
         self.graph.before = None;
+        let result = result.map(|values| look(self, values));
         self.graph.rollback(&self.code, before);
         result
     }
@@ -375,8 +395,8 @@ impl Trace {
     pub fn impossible(&self) -> Vec<(Address, crate::syntax::span::Span)> {
         let observed = self.scored().into_iter().filter(|(_, s)| *s == f64::NEG_INFINITY).map(|(n, _)| n);
         let mut found: Vec<_> = observed.map(|n| (self.graph.address(&self.code, n), self.span(n))).collect();
-        let targets = self.graph.choices.selections[0].targets();
-        let zero = targets.iter().filter(|t| self.target_score(**t) == f64::NEG_INFINITY);
+        let targets = self.all_targets();
+        let zero = targets.iter().filter(|t| self.score_of(**t) == f64::NEG_INFINITY);
         let mut chosen: Vec<_> = zero.map(|t| (self.address(*t), self.span(t.node))).collect();
         chosen.sort_by(|a, b| a.0.cmp(&b.0));
         found.extend(chosen);
@@ -422,9 +442,9 @@ impl Trace {
 
     /// Every active choice with its address and log density, by address.
     pub fn choices(&self) -> Vec<(Address, Value, f64)> {
-        let targets = self.graph.choices.selections[0].targets();
+        let targets = self.all_targets();
         let mut all: Vec<_> =
-            targets.iter().map(|t| (self.address(*t), self.value(*t), self.target_score(*t))).collect();
+            targets.iter().map(|t| (self.address(*t), self.value(*t), self.score_of(*t))).collect();
         all.sort_by(|a, b| a.0.cmp(&b.0));
         all
     }
@@ -456,7 +476,7 @@ impl Trace {
 
     /// The choices as constraints for [`Trace::generate`].
     pub fn constraints(&self) -> Vec<(u64, Constraint)> {
-        let targets = self.graph.choices.selections[0].targets();
+        let targets = self.all_targets();
         let stored = targets.iter().filter_map(|t| self.stored(*t).map(|d| (self.address_hash(*t), d)));
         stored.map(|(h, d)| (h, Constraint::Stored(d))).collect()
     }
@@ -476,6 +496,7 @@ impl Graph {
             let mut deps = node::Deps::new();
             values.push(self.plain(code, 0, *o, &mut deps).clone());
         }
+        self.settle_choices(code)?;
         Ok(values)
     }
 }

@@ -5,6 +5,7 @@ mod drift;
 mod elliptical;
 mod gibbs;
 mod hamiltonian;
+mod knn;
 mod mh;
 mod slice;
 
@@ -13,5 +14,6 @@ pub use drift::Drift;
 pub use elliptical::Elliptical;
 pub use gibbs::Gibbs;
 pub use hamiltonian::{Hmc, Nuts};
+pub use knn::Knn;
 pub use mh::Mh;
 pub use slice::Slice;

@@ -1,12 +1,14 @@
 //! Running an inference block: one chain, statement by statement.
 
+mod banks;
 mod warmup;
 
 use super::draws::{DrawRow, KernelStats, Sink};
 use super::expr::{Scope, evaluate};
 use super::init::{StartError, start_of, starts};
 use super::kernel::{At, Kernel};
-use super::kernels::{Block, Drift, Elliptical, Gibbs, Hmc, Mh, Nuts, Slice};
+use super::kernels::{Block, Drift, Elliptical, Gibbs, Hmc, Knn, Mh, Nuts, Slice};
+use super::neighbours::Banks;
 use super::population::Population;
 use super::record::Recorder;
 use super::selection::{fail, scope, selector};
@@ -38,6 +40,8 @@ pub struct RunOptions {
     pub limits: Limits,
     /// Who looks at every draw.
     pub watch: Option<Arc<dyn Watch>>,
+    /// Who finds the neighbours that `knn` proposes from.
+    pub banks: Option<Arc<dyn Banks>>,
 }
 
 impl Default for RunOptions {
@@ -50,6 +54,7 @@ impl Default for RunOptions {
             incremental: true,
             limits: Limits::default(),
             watch: None,
+            banks: None,
         }
     }
 }
@@ -163,6 +168,7 @@ pub(crate) fn run_chain(
 ) -> Result<ChainResult, ChainError> {
     let started = Instant::now();
     let how = start_of(code, plan, options)?;
+    banks::check(plan, options)?;
     let mut begun = starts(code, options.seed, chain, how, options.limits).map_err(ChainError::Start)?;
     for trace in &mut begun {
         super::force::apply(code, trace, options, chain)?;
@@ -473,12 +479,13 @@ impl Runner<'_> {
                     "mala" => Box::new(Hmc::new(scope, 1, None)),
                     "nuts" => Box::new(Nuts::new(scope, self.setting(args, "max_depth", 10, 20)?)),
                     "drift" => Box::new(Drift::new(scope, self.length(args, name, "scale")?)),
+                    "knn" => Box::new(Knn::new(scope, self.neighbours(e, args)?)),
                     "slice" => Box::new(Slice::new(scope, self.length(args, name, "width")?)),
                     _ => {
                         let message = format!("the kernel `{name}` is not available yet in this version");
                         let mut e = fail(e.span, message);
                         e.hint =
-                            Some("those that are: mh, block, drift, gibbs, elliptical, hmc, mala, nuts, slice".into());
+                            Some("those that are: mh, block, drift, gibbs, elliptical, hmc, mala, nuts, slice, knn".into());
                         return Err(e.into());
                     }
                 };

@@ -11,7 +11,7 @@ const MONITORS: &str = "Monitors and reports";
 
 /// What this version checks and documents but cannot run.
 pub(super) const PLANNED: &[&str] =
-    &["knn", "delayed", "temper", "smc", "abc", "optimize", "marginal", "acceptance", "rhat", "ess", "snapshot"];
+    &["delayed", "temper", "smc", "abc", "optimize", "marginal", "acceptance", "rhat", "ess", "snapshot"];
 
 const fn name(
     name: &'static str,
