@@ -6,8 +6,8 @@
 
 mod common;
 use common::*;
-use pcadlang::infer::{Banks, Latent, Neighbours, RunOptions};
 use pcadlang::Model;
+use pcadlang::infer::{Banks, Latent, Neighbours, RunOptions};
 use std::sync::Arc;
 
 /// A model, the cells its states are sorted into, and the posterior mass of each.
@@ -381,8 +381,11 @@ fn gaussian_choices() {
 /// Neighbours that have nothing to do with the data, and few of them: the density of the proposal is in the ratio.
 #[test]
 fn proposals_from_wrong_neighbours() {
-    let all = ["knn(@**, bank = \"b\")", "knn(one(@**), bank = \"b\", k = 2)", with_mh!("knn(@**, bank = \"b\", k = 1)")];
-    for case in [&DISCRETE, &STRUCTURE, &SHARED, &FINITE_SUPPORT, &SUPPORT, &GAUSSIAN, &ELEMENTS, &SHARED_GROUPS, &COUNTS] {
+    let all =
+        ["knn(@**, bank = \"b\")", "knn(one(@**), bank = \"b\", k = 2)", with_mh!("knn(@**, bank = \"b\", k = 1)")];
+    for case in
+        [&DISCRETE, &STRUCTURE, &SHARED, &FINITE_SUPPORT, &SUPPORT, &GAUSSIAN, &ELEMENTS, &SHARED_GROUPS, &COUNTS]
+    {
         all_balanced(case, 20_000, &all);
     }
     all_balanced(&STRUCTURE, 20_000, &[with_mh!("knn($continuous, bank = \"b\")"), with_mh!("knn(@c, bank = \"b\")")]);

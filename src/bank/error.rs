@@ -13,7 +13,9 @@ pub enum BankError {
     #[error("it is no bank; `pcadlang learn` makes one")]
     NoBank,
     /// It was written by another version.
-    #[error("it has version {found} of the format, this program reads version {expected}; make it anew with `pcadlang learn`")]
+    #[error(
+        "it has version {found} of the format, this program reads version {expected}; make it anew with `pcadlang learn`"
+    )]
     Version {
         /// The version of the file.
         found: u32,
@@ -24,7 +26,9 @@ pub enum BankError {
     #[error("it is damaged: {0}")]
     Damaged(String),
     /// It was learnt from another program.
-    #[error("it was learnt from another program, another version of it or other parameters ({name}, hash {found}; this one has {expected}); make it anew with `pcadlang learn`")]
+    #[error(
+        "it was learnt from another program, another version of it or other parameters ({name}, hash {found}; this one has {expected}); make it anew with `pcadlang learn`"
+    )]
     Program {
         /// The program's file, as it was called.
         name: String,

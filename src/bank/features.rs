@@ -1,13 +1,13 @@
 //! Which features a bank has, of a rendered scene and of what a run observes.
 
 use super::{BankError, command};
+use crate::Model;
 use crate::lang::builtins::scene::{ImageValue, KeypointsValue, ViewValue};
 use crate::lang::value::Value;
 use crate::render::{Contours, View};
 use crate::report::pictures::{Drawn, shaded};
 use crate::vision::Elements;
 use crate::vision::features::{self, Query};
-use crate::Model;
 use serde::{Deserialize, Serialize};
 use std::sync::Arc;
 
@@ -125,7 +125,9 @@ impl Observed {
             }
             Features::Command { command, size } => {
                 if detector != Some(command) {
-                    let what = format!("its features come from a command, which must be given again: --features-from '{command}'");
+                    let what = format!(
+                        "its features come from a command, which must be given again: --features-from '{command}'"
+                    );
                     return Err(BankError::Observed(what));
                 }
                 let photo = image.and_then(ImageValue::as_photo).ok_or_else(|| missing("a photograph"))?;

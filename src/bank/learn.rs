@@ -2,9 +2,9 @@
 
 use super::write::BankWriter;
 use super::{BankError, Entry, Features, Named, as_view, picture};
+use crate::Model;
 use crate::lang::code::Operand;
 use crate::lang::value::Value;
-use crate::Model;
 use crate::rng::{Purpose, StreamKey};
 use crate::trace::{Draws, Limits, Trace};
 use rayon::prelude::*;
@@ -69,7 +69,13 @@ fn draws(seed: u64, i: u64, attempt: u64) -> Draws {
 }
 
 /// Entry `i`.
-fn one(prior: &Trace, operand: Operand, how: &Learn, i: u64, seen: impl FnOnce(&crate::render::View)) -> Result<Entry, BankError> {
+fn one(
+    prior: &Trace,
+    operand: Operand,
+    how: &Learn,
+    i: u64,
+    seen: impl FnOnce(&crate::render::View),
+) -> Result<Entry, BankError> {
     let mut last = None;
     for attempt in 0..RETRIES {
         let mut trace = prior.clone();

@@ -146,7 +146,12 @@ mod tests {
 
     #[test]
     fn choices_come_back_to_the_last_bit() {
-        let named = |hash: u64, stored: Datum, free: Option<Vec<f64>>| Named { hash, address: format!("@{hash}"), stored, free };
+        let named = |hash: u64, stored: Datum, free: Option<Vec<f64>>| Named {
+            hash,
+            address: format!("@{hash}"),
+            stored,
+            free,
+        };
         let nested = Datum::List(Arc::from([Datum::Bool(true), Datum::List(Arc::from([Datum::Num(1.0)]))]));
         let all = [
             named(0, Datum::Num(-0.0), Some(vec![-0.0])),

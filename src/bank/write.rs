@@ -58,7 +58,8 @@ impl BankWriter {
         for e in entries {
             if e.features.len() as u64 != self.width {
                 let (got, first) = (e.features.len(), self.width);
-                let message = format!("a picture has {got} features, the first one had {first}; every one must have as many");
+                let message =
+                    format!("a picture has {got} features, the first one had {first}; every one must have as many");
                 return Err(BankError::Command(message));
             }
             e.features.iter().for_each(|x| features.extend(x.to_le_bytes()));
@@ -97,8 +98,7 @@ impl BankWriter {
         let at = self.end + table.len() as u64;
         self.put(self.end, &table)?;
         self.put(at, &text)?;
-        let preamble =
-            Preamble { count: self.count, width: self.width, table: self.end, header: at, hash: fnv(&text) };
+        let preamble = Preamble { count: self.count, width: self.width, table: self.end, header: at, hash: fnv(&text) };
         self.put(0, &preamble.encode())?;
         std::fs::rename(&self.partial, &self.path)?;
         self.done = true;

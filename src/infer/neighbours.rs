@@ -116,7 +116,8 @@ mod tests {
         let scene = |x: f64, y: f64| -> Latents {
             [(1, Latent::Free(vec![x, y])), (2, Latent::Discrete(Datum::Num(x)))].into_iter().collect()
         };
-        let n = Neighbours::new(vec![scene(0.0, 5.0)], &[scene(1e9, 5.0), scene(1e9 + 2.0, 5.0), scene(1e9 + 4.0, 5.0)]);
+        let n =
+            Neighbours::new(vec![scene(0.0, 5.0)], &[scene(1e9, 5.0), scene(1e9 + 2.0, 5.0), scene(1e9 + 4.0, 5.0)]);
         assert_eq!(n.spread(1, 0), 2.0);
         assert_eq!((n.spread(1, 1), n.spread(2, 0), n.spread(9, 0)), (1.0, 1.0, 1.0), "unknown or none: 1");
         assert_eq!(n.local()[&1], [0.0, 0.0], "one scene has no spread");

@@ -330,7 +330,7 @@ impl Trace {
     /// # Errors
     /// What goes wrong while they are evaluated.
     pub fn query(&mut self, operands: &[Operand], draws: Draws) -> TraceResult<Vec<Value>> {
-        self.imagine(operands, draws, |_, values| values)
+        self.asked(operands, draws, |_, values| Ok(values))
     }
 
     /// As [`Trace::query`], and shows the trace with the choices that were drawn for it, before they are forgotten.
@@ -343,13 +343,26 @@ impl Trace {
         draws: Draws,
         look: impl FnOnce(&Trace, Vec<Value>) -> T,
     ) -> TraceResult<T> {
+        self.asked(operands, draws, |trace, values| {
+            trace.graph.settle_choices(&trace.code)?;
+            Ok(look(trace, values))
+        })
+    }
+
+    /// Evaluates expressions, uses them, and forgets them.
+    fn asked<T>(
+        &mut self,
+        operands: &[Operand],
+        draws: Draws,
+        used: impl FnOnce(&mut Trace, Vec<Value>) -> TraceResult<T>,
+    ) -> TraceResult<T> {
         self.rollback();
         let before = self.graph.begin();
         self.graph.draws = draws;
         self.graph.before = Some(before.clone());
         let result = self.graph.query(&self.code, operands);
         self.graph.before = None;
-        let result = result.map(|values| look(self, values));
+        let result = result.and_then(|values| used(self, values));
         self.graph.rollback(&self.code, before);
         result
     }
@@ -443,8 +456,7 @@ impl Trace {
     /// Every active choice with its address and log density, by address.
     pub fn choices(&self) -> Vec<(Address, Value, f64)> {
         let targets = self.all_targets();
-        let mut all: Vec<_> =
-            targets.iter().map(|t| (self.address(*t), self.value(*t), self.score_of(*t))).collect();
+        let mut all: Vec<_> = targets.iter().map(|t| (self.address(*t), self.value(*t), self.score_of(*t))).collect();
         all.sort_by(|a, b| a.0.cmp(&b.0));
         all
     }
@@ -496,7 +508,6 @@ impl Graph {
             let mut deps = node::Deps::new();
             values.push(self.plain(code, 0, *o, &mut deps).clone());
         }
-        self.settle_choices(code)?;
         Ok(values)
     }
 }

@@ -142,7 +142,8 @@ pub enum SaveError {
 impl Trace {
     /// The trace as it is written to a file; `program` identifies the program.
     pub fn save(&self, program: &str) -> SavedTrace {
-        let mut choices: Vec<_> = self.all_targets()
+        let mut choices: Vec<_> = self
+            .all_targets()
             .iter()
             .filter_map(|t| {
                 let value = SavedDatum::new(&self.stored(*t)?);

@@ -247,7 +247,8 @@ mod tests {
         let to = |x: f32, r: f32| q.distance(&contour_features(&circle(x, 64.0, r, 128, 128)));
         assert_eq!(to(64.0, 30.0), 0.0);
         assert!(to(64.0, 30.0) < to(68.0, 30.0) && to(68.0, 30.0) < to(80.0, 30.0) && to(80.0, 30.0) < to(80.0, 10.0));
-        let stiff = Query::new(contour_features(&here)).distance(&contour_features(&circle(70.4, 64.0, 30.0, 128, 128)));
+        let stiff =
+            Query::new(contour_features(&here)).distance(&contour_features(&circle(70.4, 64.0, 30.0, 128, 128)));
         assert!(to(70.4, 30.0) < 0.2 * stiff, "{} against {stiff}", to(70.4, 30.0));
     }
 

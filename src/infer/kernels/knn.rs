@@ -104,9 +104,16 @@ struct Place {
 }
 
 enum Form {
-    Discrete { value: Datum, support: Support },
+    Discrete {
+        value: Datum,
+        support: Support,
+    },
     /// Coordinates, the log Jacobian of the transform there, and which coordinates are angles.
-    Free { y: Vec<f64>, jacobian: f64, angles: Vec<bool> },
+    Free {
+        y: Vec<f64>,
+        jacobian: f64,
+        angles: Vec<bool>,
+    },
     /// In part discrete: always drawn from the prior.
     Mixed,
 }

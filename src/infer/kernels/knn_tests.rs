@@ -43,16 +43,16 @@ fn densities_of_numbers_integrate_to_one() {
     let models = [
         ("assume x ~ normal(1, 2); observe normal(x, 1) = 0;", -25.0, 25.0),
         ("assume x ~ uniform(2, 5); observe normal(x, 1) = 0;", 2.0, 5.0),
-        ("assume x ~ gamma(2, 1); observe normal(x, 1) = 0;", 0.0, 60.0),
+        ("assume x ~ gamma(2, 1); observe normal(x, 1) = 0;", 0.0, 400.0),
         ("assume x ~ von_mises(0.5, 2); observe normal(x, 1) = 0;", -PI, PI),
     ];
     for (text, lo, hi) in models {
         let t = trace(text);
-        let k = kernel(free(&t, &[-0.3, 0.4, 2.9]), &[]);
-        let n = 40_000;
+        let k = kernel(free(&t, &[-0.3, 0.4, 1.9]), &[]);
+        let n = 200_000;
         let h = (hi - lo) / f64::from(n);
         let total: f64 = (0..n).map(|i| density(&k, &t, Datum::Num(lo + (f64::from(i) + 0.5) * h)) * h).sum();
-        assert!((total - 1.0).abs() < 2e-4, "{text}: {total}");
+        assert!((total - 1.0).abs() < 1e-3, "{text}: {total}");
     }
 }
 

@@ -484,8 +484,9 @@ impl Runner<'_> {
                     _ => {
                         let message = format!("the kernel `{name}` is not available yet in this version");
                         let mut e = fail(e.span, message);
-                        e.hint =
-                            Some("those that are: mh, block, drift, gibbs, elliptical, hmc, mala, nuts, slice, knn".into());
+                        e.hint = Some(
+                            "those that are: mh, block, drift, gibbs, elliptical, hmc, mala, nuts, slice, knn".into(),
+                        );
                         return Err(e.into());
                     }
                 };
