@@ -62,15 +62,14 @@ mod tests {
     #[test]
     fn numbers_are_read_and_anything_else_is_an_error() {
         let picture = RgbImage::new(3, 2);
-        assert_eq!(features("printf 1,2.5\\n-3e2\\t{png}", &picture).is_err(), true, "a path is no number");
         let said = |c: &str| features(c, &picture).map_err(|e| e.to_string());
-        // The size of the file, then its name, which is no number.
+        // The bytes of a picture are no numbers.
         assert!(said("cat {png}").unwrap_err().contains("must print finite numbers"));
         assert!(said("false {png}").unwrap_err().contains("it failed"));
         assert!(said("true {png}").unwrap_err().contains("no numbers"));
         assert!(said("true").unwrap_err().contains("{png}"));
         assert!(said("no-such-program {png}").unwrap_err().contains("cannot run no-such-program"));
-        let expr = said("expr length {png} - length {png}").unwrap();
-        assert_eq!(expr, [0.0]);
+        let length = said("expr length {png}").unwrap();
+        assert!(length.len() == 1 && length[0] > 10.0, "{length:?}");
     }
 }
