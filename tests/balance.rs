@@ -381,8 +381,11 @@ fn gaussian_choices() {
 /// Neighbours that have nothing to do with the data, and few of them: the density of the proposal is in the ratio.
 #[test]
 fn proposals_from_wrong_neighbours() {
-    let all =
-        ["knn(@**, bank = \"b\")", "knn(one(@**), bank = \"b\", k = 2)", with_mh!("knn(@**, bank = \"b\", k = 1)")];
+    let all = [
+        "knn(@**, bank = \"b\")",
+        "mix { 0.6 => knn(one(@**), bank = \"b\", k = 2); 0.4 => block(@**); }",
+        "mix { 0.6 => knn(@**, bank = \"b\", k = 1); 0.4 => block(@**); }",
+    ];
     for case in
         [&DISCRETE, &STRUCTURE, &SHARED, &FINITE_SUPPORT, &SUPPORT, &GAUSSIAN, &ELEMENTS, &SHARED_GROUPS, &COUNTS]
     {

@@ -4,13 +4,14 @@
 mod folder;
 
 use folder::{Folder, disc, png};
-use pcadlang::bank::{Bank, BankError, Features, as_view};
-use pcadlang::lang::builtins::scene::ImageValue;
+use pcadlang::bank::{Bank, BankError, Features, Observed, as_view};
+use pcadlang::lang::builtins::scene::{ImageValue, KeypointsValue};
 use pcadlang::lang::value::Value;
 use pcadlang::render::Contours;
 use pcadlang::trace::{Constraint, Draws, Limits, Trace};
 use pcadlang::vision::ContourMap;
 use pcadlang::vision::features::Query;
+use pcadlang::vision::keypoints::{Keypoint, Keypoints};
 use pcadlang::{Model, Program};
 use std::sync::Arc;
 
@@ -26,10 +27,10 @@ fn middle() { d ~ beta(2, 2); d }
 assume rs = [1, 1, if waist { middle() } else { 1 }, 1, 1];
 assume view = scene.render(scene.affine(translate = [x, 0, 0])
             * scene.centred(scene.lathe([{ y: linspace(0, h, 5), r: r * rs }], sides = sides)));
-observe scene.chamfer(view, sigma = 1, symmetric = true, size = 64) = photo as distance;
+observe scene.chamfer(view, sigma = 5, symmetric = true, size = 64) = photo as distance;
 infer {
   warmup 20 { knn(@**, bank = "small.bank", k = 5); }
-  repeat 60 {
+  repeat 200 {
     mix { 0.5 => knn(@**, bank = "small.bank", k = 5); 0.5 => drift(one(@**)); }
     collect h, r, x, waist, log_joint();
   }
@@ -197,4 +198,37 @@ fn features_may_come_from_a_command() {
     f.refuses(&[&LEARN[..], &["--features-from", command]].concat(), "must print finite numbers");
     f.write("detector.sh", "exit 3");
     f.refuses(&[&LEARN[..], &["--features-from", command]].concat(), "it failed");
+}
+
+/// Keypoints: where the landmarks of a scene are seen, that scene is the nearest, also when half of them are missing.
+#[test]
+fn a_bank_of_bodies_is_searched_by_keypoints() {
+    let f = Folder::new("bank_bodies");
+    f.succeeds(&["learn", "human.pcad", "-n", "30", "--features", "keypoints", "-o", "human.bank", "--quiet"]);
+    let bank = Bank::open(&f.path().join("human.bank")).unwrap();
+    let Features::Keypoints { names } = &bank.header().features else { panic!("{:?}", bank.header()) };
+    assert!(names.iter().any(|n| n == "nose") && names.len() > 10, "{names:?}");
+    for i in [0, 7, 29] {
+        let features = bank.features(i).unwrap();
+        assert_eq!(features.len(), 2 * names.len());
+        let pixels = |x: f32| f64::from(x) * 64.0 + 32.0;
+        let point = |(n, at): (&String, &[f32])| Keypoint {
+            name: n.as_str().into(),
+            x: pixels(at[0]),
+            y: pixels(at[1]),
+            confidence: 0.8,
+        };
+        let seen: Vec<Keypoint> = names.iter().zip(features.chunks(2)).map(point).step_by(2).collect();
+        let seen = Value::object(KeypointsValue(Keypoints::new(seen).unwrap()));
+        let photo = Value::object(ImageValue::contours(line(), None));
+        let program = Program::open("human.pcad").unwrap().observe("photo", photo).observe("points", seen);
+        let m = program.compile().unwrap();
+        bank.check(m.hash()).unwrap();
+        let query = Observed::of(&m).query(&bank.header().features, None).unwrap();
+        assert_eq!(bank.nearest(&query, 5).unwrap()[0].0, i);
+        let contours = Observed::of(&m).query(&Features::Contours { size: 64 }, None).unwrap();
+        assert!(matches!(bank.nearest(&contours, 5), Err(BankError::Command(_))));
+    }
+    let bare = Program::open("human.pcad").unwrap().without_data().compile().unwrap();
+    assert!(matches!(Observed::of(&bare).query(&bank.header().features, None), Err(BankError::Observed(_))));
 }
