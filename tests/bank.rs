@@ -5,6 +5,7 @@ mod folder;
 
 use folder::{Folder, disc, png};
 use pcadlang::bank::{Bank, BankError, Features, Observed, as_view};
+use pcadlang::infer::{Banks, Neighbours, RunOptions};
 use pcadlang::lang::builtins::scene::{ImageValue, KeypointsValue};
 use pcadlang::lang::value::Value;
 use pcadlang::render::Contours;
@@ -231,4 +232,24 @@ fn a_bank_of_bodies_is_searched_by_keypoints() {
     }
     let bare = Program::open("human.pcad").unwrap().without_data().compile().unwrap();
     assert!(matches!(Observed::of(&bare).query(&bank.header().features, None), Err(BankError::Observed(_))));
+}
+
+/// What is wrong with a kernel's arguments is said before a chain begins, with its place.
+#[test]
+fn a_bank_that_is_not_there_is_an_error_at_the_kernel() {
+    let error = |kernel: &str, banks: Option<Arc<dyn Banks>>| {
+        let text = format!(
+            "assume x ~ normal(0, 1); observe normal(x, 1) = 0; let k = 0;
+             infer {{ warmup 1 {{ drift(@x); }} repeat 10 {{ {kernel}; collect x; }} }}"
+        );
+        let options = RunOptions { banks, ..RunOptions::default() };
+        Model::from_text(&text).unwrap().run(&options, 1, 1).err().map(|e| e.to_string())
+    };
+    let none = || -> Option<Arc<dyn Banks>> { Some(Arc::new(Neighbours::default())) };
+    let missing = error("knn(@**, bank = \"b\")", None).unwrap();
+    assert!(missing.contains("\"b\" is not known to this run") && missing.contains("knn(@**"), "{missing}");
+    assert!(error("knn(@**, bank = \"b\", k = 0)", none()).unwrap().contains("whole number from 1"));
+    assert!(error("knn(@**, bank = \"b\", k = k)", none()).unwrap().contains("whole number from 1"));
+    assert!(error("knn(@**, bank = k)", none()).unwrap().contains("must be a string"));
+    assert_eq!(error("knn(@**, bank = \"b\")", none()), None, "no neighbours: draws from the prior");
 }

@@ -1,7 +1,7 @@
 //! The latents of one entry, and their bytes in a file (little-endian):
 //!
 //! the number of choices (u32), then for each the index of its address in the header's table (u32), its stored value, and its
-//! unconstrained coordinates: their number (u32; [`SAME`]: they are the stored numbers) and the numbers (f64). A value is a tag
+//! unconstrained coordinates: their number (u32; the largest: they are the stored numbers) and the numbers (f64). A value is a tag
 //! (u8), then: 0 a truth value (u8); 1 a number (f64); 2 numbers (u32, f64 each); 3 values (u32, each a value).
 
 use crate::dist::Datum;
