@@ -141,7 +141,7 @@ fn entries_come_back_and_the_nearest_picture_of_an_entry_is_its_own() {
 #[test]
 fn banks_that_do_not_fit_are_refused() {
     let f = small("bank_refused");
-    f.refuses(&RUN, "small.bank cannot be read: there is no such file");
+    refused(&f, "small.bank cannot be read: there is no such file");
     f.write("small.bank", "not a bank");
     refused(&f, "it is no bank");
     f.succeeds(&LEARN);
