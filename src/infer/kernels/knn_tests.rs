@@ -49,10 +49,10 @@ fn densities_of_numbers_integrate_to_one() {
     for (text, lo, hi) in models {
         let t = trace(text);
         let k = kernel(free(&t, &[-0.3, 0.4, 1.9]), &[]);
-        let n = 200_000;
+        let n = 20_000;
         let h = (hi - lo) / f64::from(n);
         let total: f64 = (0..n).map(|i| density(&k, &t, Datum::Num(lo + (f64::from(i) + 0.5) * h)) * h).sum();
-        assert!((total - 1.0).abs() < 1e-3, "{text}: {total}");
+        assert!((total - 1.0).abs() < 2e-3, "{text}: {total}");
     }
 }
 
@@ -90,8 +90,8 @@ fn the_mixture_is_joint() {
         _ => f64::NAN,
     };
     let sd = |i: usize| {
-        let (a, b) = ([-1.0, 2.0][i], [0.5, -4.0][i]);
-        let local = (a - b as f64).abs() / 2f64.sqrt();
+        let (a, b): (f64, f64) = ([-1.0, 2.0][i], [0.5, -4.0][i]);
+        let local = (a - b).abs() / 2f64.sqrt();
         let wide = [1.0, 10.0][i] * 2.5f64.sqrt();
         (1.06 * 2f64.powf(-0.2) * local).max(FLOOR * wide)
     };
