@@ -227,6 +227,8 @@ fn a_bank_of_bodies_is_searched_by_keypoints() {
         bank.check(m.hash()).unwrap();
         let query = Observed::of(&m).query(&bank.header().features, None).unwrap();
         assert_eq!(bank.nearest(&query, 5).unwrap()[0].0, i);
+        let strange = Features::Keypoints { names: vec!["trunk".into()] };
+        assert!(matches!(Observed::of(&m).query(&strange, None), Err(BankError::Observed(_))));
         let contours = Observed::of(&m).query(&Features::Contours { size: 64 }, None).unwrap();
         assert!(matches!(bank.nearest(&contours, 5), Err(BankError::Command(_))));
     }

@@ -120,6 +120,9 @@ impl Observed {
                 };
                 let find = |name: &String| seen.points().iter().find(|p| *p.name == **name);
                 let at: Vec<_> = names.iter().map(|n| find(n).map(|p| seen.position(p, size))).collect();
+                if at.iter().all(Option::is_none) {
+                    return Err(missing("keypoints that the scene has"));
+                }
                 let sure: Vec<f64> = names.iter().map(|n| find(n).map_or(0.0, |p| p.confidence)).collect();
                 Ok(Query::keypoints(&at, &sure, size.0, size.1))
             }
