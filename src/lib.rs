@@ -6,6 +6,7 @@
 #![warn(missing_docs)]
 #![forbid(unsafe_code)]
 
+pub mod bank;
 pub mod diag;
 pub mod dist;
 pub mod geom;

@@ -6,6 +6,9 @@
 
 mod common;
 use common::*;
+use pcadlang::Model;
+use pcadlang::infer::{Banks, Latent, Neighbours, RunOptions};
+use std::sync::Arc;
 
 /// A model, the cells its states are sorted into, and the posterior mass of each.
 struct Case {
@@ -190,6 +193,13 @@ const COUNTS: Case = Case {
     },
 };
 
+/// Three draws from the prior, which have nothing to do with the data: neighbours that mislead.
+fn wrong_neighbours(text: &str) -> Neighbours {
+    let model = Model::from_text(text).unwrap();
+    let draw = |i| Latent::all(&model.simulate(9, i).unwrap());
+    Neighbours::new((0..3).map(draw).collect(), &(3..40).map(draw).collect::<Vec<_>>())
+}
+
 /// Runs a kernel for long and judges it.
 fn balanced(case: &Case, kernel: &str, steps: usize) {
     let what = format!("{}, {kernel}", case.name);
@@ -198,7 +208,9 @@ fn balanced(case: &Case, kernel: &str, steps: usize) {
         "{} infer {{ repeat 300 {{ {stmt} }} repeat {steps} {{ {stmt} collect {}; }} }}",
         case.text, case.collect
     );
-    let d = run(&text, 101, 1);
+    let banks: Arc<dyn Banks> = Arc::new(wrong_neighbours(case.text));
+    let options = RunOptions { seed: 101, banks: Some(banks), ..RunOptions::default() };
+    let d = run_with(&text, &options, 1, 1);
     let states: Vec<usize> = (0..steps).map(|i| (case.cell)(&d, i)).collect();
     let mass = (case.mass)();
     let n = mass.len();
@@ -364,6 +376,22 @@ fn gaussian_choices() {
         "block(@**)",
     ];
     all_balanced(&GAUSSIAN, 20_000, &kernels);
+}
+
+/// Neighbours that have nothing to do with the data, and few of them: the density of the proposal is in the ratio.
+#[test]
+fn proposals_from_wrong_neighbours() {
+    let all = [
+        "knn(@**, bank = \"b\")",
+        "mix { 0.6 => knn(one(@**), bank = \"b\", k = 2); 0.4 => block(@**); }",
+        "mix { 0.6 => knn(@**, bank = \"b\", k = 1); 0.4 => block(@**); }",
+    ];
+    for case in
+        [&DISCRETE, &STRUCTURE, &SHARED, &FINITE_SUPPORT, &SUPPORT, &GAUSSIAN, &ELEMENTS, &SHARED_GROUPS, &COUNTS]
+    {
+        all_balanced(case, 20_000, &all);
+    }
+    all_balanced(&STRUCTURE, 20_000, &[with_mh!("knn($continuous, bank = \"b\")"), with_mh!("knn(@c, bank = \"b\")")]);
 }
 
 /// Getting it right (Geweke 2004): data drawn anew given the parameters, then the parameters moved given the data, by turns.

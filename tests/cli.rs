@@ -76,11 +76,12 @@ fn doc() {
 
 #[test]
 fn help() {
-    let all: [&[&str]; 8] = [
+    let all: [&[&str]; 9] = [
         &["--help"],
         &["run", "--help"],
         &["evaluate", "--help"],
         &["sample", "--help"],
+        &["learn", "--help"],
         &["check", "--help"],
         &["contours", "--help"],
         &["doc", "--help"],

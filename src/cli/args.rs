@@ -22,6 +22,8 @@ pub enum Command {
     Evaluate(Evaluate),
     /// Draw scenes from the prior and show them on one sheet
     Sample(Sample),
+    /// Draw scenes from the prior into a bank, from which the kernel `knn` proposes
+    Learn(Learn),
     /// Check programs without running them
     Check(Check),
     /// Find the contours of a photograph
@@ -87,6 +89,9 @@ pub struct Job {
     /// without it the one called like the photograph's file
     #[arg(long, value_name = "FILE[#ID]")]
     pub keypoints: Option<String>,
+    /// The command that finds the features of the photograph, for a bank that was learnt with it
+    #[arg(long, value_name = "CMD")]
+    pub features_from: Option<String>,
     /// Seed, chains, steps, time
     #[command(flatten)]
     pub sampling: Sampling,
@@ -170,6 +175,48 @@ pub struct Sample {
     /// The longer side of each picture in pixels
     #[arg(long, default_value_t = 192, value_parser = clap::value_parser!(u32).range(16..=2048))]
     pub size: u32,
+}
+
+/// `learn`.
+#[derive(Args, Debug)]
+pub struct Learn {
+    /// Program, parameters, camera
+    #[command(flatten)]
+    pub given: Given,
+    /// How many scenes
+    #[arg(short, default_value_t = 10_000, value_parser = clap::value_parser!(u32).range(1..))]
+    pub n: u32,
+    /// The bank to write
+    #[arg(short, long, value_name = "BANK")]
+    pub out: PathBuf,
+    /// The seed: same seed, same bank
+    #[arg(long, default_value_t = 1)]
+    pub seed: u64,
+    /// The number of threads; as many as the machine has, if left out
+    #[arg(long, value_parser = clap::value_parser!(u32).range(1..=1024))]
+    pub threads: Option<u32>,
+    /// What tells pictures apart
+    #[arg(long, value_enum, default_value_t = FeatureKind::Contours)]
+    pub features: FeatureKind,
+    /// A command that prints features of a picture, in place of the built-in ones: numbers, as many for every picture. {png}
+    /// stands for the picture's file; no shell reads it
+    #[arg(long, value_name = "CMD", conflicts_with = "features")]
+    pub features_from: Option<String>,
+    /// The longer side of the pictures that features are found in, in pixels
+    #[arg(long, default_value_t = 128, value_parser = clap::value_parser!(u32).range(16..=2048))]
+    pub features_size: u32,
+    /// Print nothing but errors
+    #[arg(long)]
+    pub quiet: bool,
+}
+
+/// The built-in features.
+#[derive(Clone, Copy, Debug, PartialEq, Eq, clap::ValueEnum)]
+pub enum FeatureKind {
+    /// Distances to contours and histograms of their directions
+    Contours,
+    /// The positions of landmarks
+    Keypoints,
 }
 
 /// `check`.

@@ -6,6 +6,7 @@ use super::args::Job;
 use super::best::best_draw;
 use super::keypoints::Joints;
 use super::{Failure, given, plain, progress};
+use pcadlang::bank::BankFiles;
 use pcadlang::infer::draws::{KernelStats, Sink};
 use pcadlang::infer::{ChainResult, Progress};
 use pcadlang::report::html::{MeshData, Page, page};
@@ -13,6 +14,7 @@ use pcadlang::report::{ChainDraws, Memory, Quantity, RunDir, Tee, csv::CsvSink, 
 use pcadlang::vision::Photo;
 use pcadlang::{Model, RunOptions};
 use serde_json::{Map, Value, json};
+use std::path::Path;
 use std::sync::atomic::{AtomicBool, Ordering};
 use std::sync::{Arc, Mutex, PoisonError, Weak};
 use std::time::Instant;
@@ -86,6 +88,11 @@ impl Interrupt {
             run.cancelled.store(true, Ordering::Relaxed);
         }
     }
+}
+
+/// The folder a program is in.
+fn folder(program: &str) -> &Path {
+    Path::new(program).parent().unwrap_or(Path::new(""))
 }
 
 /// The number of threads of a run.
@@ -180,6 +187,7 @@ fn fill(
         time: s.time.map(|t| t.saturating_sub(begun.elapsed())),
         incremental: !s.no_incremental,
         watch: Some(Arc::new(joints.clone())),
+        banks: Some(Arc::new(BankFiles::new(model, folder(&job.given.program), job.features_from.clone()))),
         ..RunOptions::default()
     };
     let memories: Vec<Memory> = (0..s.chains).map(|_| Memory::default()).collect();

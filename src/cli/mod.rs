@@ -10,6 +10,7 @@ mod files;
 mod given;
 mod job;
 mod keypoints;
+mod learn;
 mod progress;
 mod run;
 mod sample;
@@ -60,6 +61,7 @@ pub fn main(cli: Cli) -> ExitCode {
         Command::Run(a) => run::run(&a),
         Command::Evaluate(a) => evaluate::evaluate(&a),
         Command::Sample(a) => sample::sample(&a),
+        Command::Learn(a) => learn::learn(&a),
         Command::Check(a) => check::check(&a),
         Command::Contours(a) => contours::contours(&a),
         Command::Doc(a) => doc::doc(&a),

@@ -4,7 +4,7 @@ use super::term;
 use indicatif::{ProgressBar, ProgressDrawTarget, ProgressStyle};
 use pcadlang::infer::Progress;
 use pcadlang::report::{number, seconds};
-use std::sync::atomic::{AtomicBool, Ordering};
+use std::sync::atomic::{AtomicBool, AtomicU64, Ordering};
 use std::time::{Duration, Instant};
 
 /// Between two looks at the chains.
@@ -32,6 +32,22 @@ pub fn watch(progress: &Progress, done: &AtomicBool, limit: Option<Duration>, qu
         }
         bar.set_message(line(steps, elapsed, best, limit));
         bar.tick();
+        std::thread::sleep(PAUSE);
+    }
+    bar.finish_and_clear();
+}
+
+/// Shows how many of so many things are done, until `over`.
+pub fn count(done: &AtomicU64, of: u64, over: &AtomicBool, quiet: bool) {
+    if quiet || !term::is_live() {
+        return;
+    }
+    let bar = ProgressBar::with_draw_target(Some(of), ProgressDrawTarget::stderr());
+    if let Ok(style) = ProgressStyle::with_template("{bar:24} {pos} of {len}, {eta} left") {
+        bar.set_style(style);
+    }
+    while !over.load(Ordering::Relaxed) {
+        bar.set_position(done.load(Ordering::Relaxed));
         std::thread::sleep(PAUSE);
     }
     bar.finish_and_clear();

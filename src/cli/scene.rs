@@ -1,6 +1,7 @@
 //! From a trace to pictures: finding the view of a program and drawing it.
 
-use pcadlang::lang::builtins::scene::{SolidValue, ViewValue};
+use pcadlang::bank;
+use pcadlang::lang::builtins::scene::ViewValue;
 use pcadlang::lang::code::Operand;
 use pcadlang::lang::value::Value;
 use pcadlang::render::{Camera, Contours, Frame, View};
@@ -23,20 +24,9 @@ pub fn view_operand(trace: &mut Trace, draws: Draws) -> Option<Operand> {
 
 /// The program's view: the last top-level name that is one, or the last solid before a camera.
 pub fn view(trace: &mut Trace, draws: Draws, camera: Option<Camera>) -> Option<Arc<View>> {
-    let globals: Vec<Operand> = trace.code().globals.values().rev().copied().collect();
-    let mut solid = None;
-    for o in globals {
-        let Ok(values) = trace.query(&[o], draws) else { continue };
-        let Some(v) = values.first() else { continue };
-        if let Some(v) = v.downcast::<ViewValue>() {
-            return Some(Arc::clone(&v.0));
-        }
-        if solid.is_none() {
-            solid = v.downcast::<SolidValue>().map(|s| s.0.clone());
-        }
-    }
-    let camera = camera.unwrap_or_else(|| Camera::default_for(256, 256));
-    solid.map(|s| Arc::new(View::new(s, camera)))
+    let at = bank::picture(trace, draws)?;
+    let values = trace.query(&[at], draws).ok()?;
+    bank::as_view(values.first()?, camera)
 }
 
 /// A frame as the reports want it.

@@ -2,8 +2,9 @@
 
 use super::expr::{Scope, evaluate};
 use super::kernel::Kernel;
-use super::kernels::{Block, Drift, Elliptical, Gibbs, Hmc, Mh, Nuts, Optimize, Own, Slice, Temper};
-use super::plan::{argument, call};
+use super::kernels::{Block, Drift, Elliptical, Gibbs, Hmc, Knn, Mh, Nuts, Optimize, Own, Slice, Temper};
+use super::plan::banks::neighbours;
+use super::plan::{RunOptions, argument, call};
 use super::selection::{fail, scope};
 use crate::lang::error::RunError;
 use crate::lang::value::Value;
@@ -23,7 +24,12 @@ pub(super) struct Built {
 ///
 /// # Errors
 /// What is wrong with it, at its place.
-pub(super) fn build(e: &Expr, frozen: &Selector, env: &mut Scope) -> Result<Built, Box<RunError>> {
+pub(super) fn build(
+    e: &Expr,
+    frozen: &Selector,
+    options: &RunOptions,
+    env: &mut Scope,
+) -> Result<Built, Box<RunError>> {
     let Some((name, args)) = call(e) else {
         return Err(fail(e.span, "a kernel such as mh(one(@**)) was expected".into()));
     };
@@ -46,7 +52,7 @@ pub(super) fn build(e: &Expr, frozen: &Selector, env: &mut Scope) -> Result<Buil
         let hottest = positive(argument(args, 2, "hottest"), name, "hottest", env)?.unwrap_or(0.01);
         let mut inner = Vec::with_capacity(levels as usize);
         for _ in 0..levels {
-            inner.push(build(&first.value, frozen, env)?);
+            inner.push(build(&first.value, frozen, options, env)?);
         }
         let signature = format!("temper({}, {levels}, {hottest})", inner[0].signature);
         let kernel = Temper::new(inner.into_iter().map(|b| b.kernel).collect(), hottest.min(1.0));
@@ -65,6 +71,7 @@ pub(super) fn build(e: &Expr, frozen: &Selector, env: &mut Scope) -> Result<Buil
         "hmc" => Box::new(Hmc::new(scope, whole(argument(args, 1, "steps"), "steps", 10, 1, 10_000, env)?, None)),
         "mala" => Box::new(Hmc::new(scope, 1, None)),
         "nuts" => Box::new(Nuts::new(scope, whole(argument(args, 1, "max_depth"), "max_depth", 10, 1, 20, env)?)),
+        "knn" => Box::new(Knn::new(scope, neighbours(e, args, options, env)?)),
         "drift" => Box::new(Drift::new(scope, positive(argument(args, 1, "scale"), name, "scale", env)?)),
         "slice" => Box::new(Slice::new(scope, positive(argument(args, 1, "width"), name, "width", env)?)),
         "optimize" => {
@@ -79,7 +86,7 @@ pub(super) fn build(e: &Expr, frozen: &Selector, env: &mut Scope) -> Result<Buil
     Ok(Built { kernel, signature })
 }
 
-const AVAILABLE: &str = "mh, block, drift, gibbs, elliptical, hmc, mala, nuts, slice, temper, optimize";
+const AVAILABLE: &str = "mh, block, drift, gibbs, elliptical, hmc, mala, nuts, slice, knn, temper, optimize";
 
 /// A positive number that a kernel takes besides its selection, if it is given.
 fn positive(e: Option<&Expr>, kernel: &str, name: &str, env: &mut Scope) -> Result<Option<f64>, Box<RunError>> {

@@ -211,7 +211,7 @@ impl Trace {
     pub fn restore(&mut self, saved: &[(u64, Constraint)], draws: Draws) -> TraceResult<()> {
         self.rollback();
         let values: rustc_hash::FxHashMap<u64, &Constraint> = saved.iter().map(|(h, c)| (*h, c)).collect();
-        let here = self.graph.choices.selections[0].targets();
+        let here = self.all_targets();
         let changes: Vec<_> = here
             .iter()
             .filter_map(|t| match values.get(&self.address_hash(*t)) {
@@ -258,12 +258,13 @@ impl Trace {
         let selection = self.select(selector);
         let mut sum = crate::num::ExactSum::default();
         for t in self.targets(selection).to_vec() {
-            sum.add(self.target_score(t));
+            sum.add(self.score_of(t));
         }
         sum.value()
     }
 
-    fn target_score(&self, t: Target) -> f64 {
+    /// The log density of a choice under its prior given the rest, in the present state, also that of a pending proposal.
+    pub fn score_of(&self, t: Target) -> f64 {
         let node = &self.graph.nodes[t.node as usize];
         match node.side.as_deref() {
             Some(node::Side::Choice(c)) if t.element != NONE => c.scores[t.element as usize],
@@ -278,7 +279,7 @@ impl Trace {
     /// # Errors
     /// An operation between a choice and the score of which no derivative is known.
     pub fn gradient(&self, targets: &[Target], power: f64, out: &mut Vec<f64>) -> TraceResult<()> {
-        let mut scored: Vec<u32> = self.graph.choices.selections[0].targets().iter().map(|t| t.node).collect();
+        let mut scored: Vec<u32> = self.all_targets().iter().map(|t| t.node).collect();
         scored.dedup();
         scored.extend(self.scored_nodes());
         self.graph.gradient(&self.code, targets, &scored, power, out)
@@ -308,6 +309,11 @@ impl Trace {
     /// The choices a selection now has, in the order of the program: by place in the text and pass of the loops around.
     pub fn in_program_order(&self, selection: Selection) -> Vec<Target> {
         self.graph.in_program_order(self.targets(selection))
+    }
+
+    /// All active choices, in the order of the hashes of their addresses.
+    pub fn all_targets(&self) -> &[Target] {
+        self.graph.choices.selections[0].targets()
     }
 
     /// The choice at an address, if it is active. An element of a choice has the element's index as last key.
@@ -381,7 +387,7 @@ impl Trace {
 
     /// How many choices (elements counted one by one) are active.
     pub fn choice_count(&self) -> usize {
-        self.graph.choices.selections[0].targets().len()
+        self.all_targets().len()
     }
 
     /// The values of expressions of the top level; what they need and no observation asks for is drawn from its prior
@@ -390,12 +396,39 @@ impl Trace {
     /// # Errors
     /// What goes wrong while they are evaluated.
     pub fn query(&mut self, operands: &[Operand], draws: Draws) -> TraceResult<Vec<Value>> {
+        self.asked(operands, draws, |_, values| Ok(values))
+    }
+
+    /// As [`Trace::query`], and shows the trace with the choices that were drawn for it, before they are forgotten.
+    ///
+    /// # Errors
+    /// As [`Trace::query`].
+    pub fn imagine<T>(
+        &mut self,
+        operands: &[Operand],
+        draws: Draws,
+        look: impl FnOnce(&Trace, Vec<Value>) -> T,
+    ) -> TraceResult<T> {
+        self.asked(operands, draws, |trace, values| {
+            trace.graph.settle_choices(&trace.code)?;
+            Ok(look(trace, values))
+        })
+    }
+
+    /// Evaluates expressions, uses them, and forgets them.
+    fn asked<T>(
+        &mut self,
+        operands: &[Operand],
+        draws: Draws,
+        used: impl FnOnce(&mut Trace, Vec<Value>) -> TraceResult<T>,
+    ) -> TraceResult<T> {
         self.rollback();
         let before = self.graph.begin();
         self.graph.draws = draws;
         self.graph.before = Some(before.clone());
         let result = self.graph.query(&self.code, operands);
         self.graph.before = None;
+        let result = result.and_then(|values| used(self, values));
         self.graph.rollback(&self.code, before);
         result
     }
@@ -441,8 +474,8 @@ impl Trace {
     pub fn impossible(&self) -> Vec<(Address, crate::syntax::span::Span)> {
         let observed = self.scored().into_iter().filter(|(_, s)| *s == f64::NEG_INFINITY).map(|(n, _)| n);
         let mut found: Vec<_> = observed.map(|n| (self.graph.address(&self.code, n), self.span(n))).collect();
-        let targets = self.graph.choices.selections[0].targets();
-        let zero = targets.iter().filter(|t| self.target_score(**t) == f64::NEG_INFINITY);
+        let targets = self.all_targets();
+        let zero = targets.iter().filter(|t| self.score_of(**t) == f64::NEG_INFINITY);
         let mut chosen: Vec<_> = zero.map(|t| (self.address(*t), self.span(t.node))).collect();
         chosen.sort_by(|a, b| a.0.cmp(&b.0));
         found.extend(chosen);
@@ -488,9 +521,8 @@ impl Trace {
 
     /// Every active choice with its address and log density, by address.
     pub fn choices(&self) -> Vec<(Address, Value, f64)> {
-        let targets = self.graph.choices.selections[0].targets();
-        let mut all: Vec<_> =
-            targets.iter().map(|t| (self.address(*t), self.value(*t), self.target_score(*t))).collect();
+        let targets = self.all_targets();
+        let mut all: Vec<_> = targets.iter().map(|t| (self.address(*t), self.value(*t), self.score_of(*t))).collect();
         all.sort_by(|a, b| a.0.cmp(&b.0));
         all
     }
@@ -522,7 +554,7 @@ impl Trace {
 
     /// The choices as constraints for [`Trace::generate`].
     pub fn constraints(&self) -> Vec<(u64, Constraint)> {
-        let targets = self.graph.choices.selections[0].targets();
+        let targets = self.all_targets();
         let stored = targets.iter().filter_map(|t| self.stored(*t).map(|d| (self.address_hash(*t), d)));
         stored.map(|(h, d)| (h, Constraint::Stored(d))).collect()
     }

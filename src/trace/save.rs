@@ -142,8 +142,8 @@ pub enum SaveError {
 impl Trace {
     /// The trace as it is written to a file; `program` identifies the program.
     pub fn save(&self, program: &str) -> SavedTrace {
-        let mut choices: Vec<_> = self.graph.choices.selections[0]
-            .targets()
+        let mut choices: Vec<_> = self
+            .all_targets()
             .iter()
             .filter_map(|t| {
                 let value = SavedDatum::new(&self.stored(*t)?);
@@ -182,7 +182,7 @@ impl Trace {
         let (trace, _) = trace.map_err(SaveError::Run)?;
         for c in &saved.choices {
             let hash = u64::from_str_radix(&c.hash, 16).unwrap_or_default();
-            let known = trace.graph.choices.selections[0].targets().iter().any(|t| trace.address_hash(*t) == hash);
+            let known = trace.all_targets().iter().any(|t| trace.address_hash(*t) == hash);
             if !known {
                 return Err(SaveError::Unknown(c.address.clone()));
             }

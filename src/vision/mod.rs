@@ -14,6 +14,7 @@ pub mod distance_transform;
 pub mod elements;
 pub mod error;
 pub mod exif;
+pub mod features;
 mod field;
 pub mod gradient;
 pub mod keypoints;

@@ -112,7 +112,14 @@ impl<'a> Evaluation<'a> {
             let case = Case { camera: camera.clone(), ..case };
             let observe = observations_for(&case, detections.as_ref()).iter().map(|o| items.spec(o)).collect();
             let given = Given { camera, ..a.given.clone() };
-            let job = Job { given, observe, observe_contours: None, keypoints: None, sampling: a.sampling.clone() };
+            let job = Job {
+                given,
+                observe,
+                observe_contours: None,
+                keypoints: None,
+                features_from: None,
+                sampling: a.sampling.clone(),
+            };
             let mut record = job::record(&job, &hash);
             let inputs = bytes_hash(&observed::bytes(&case, detections.as_ref()));
             record.insert("inputs_hash".into(), json!(inputs));

@@ -1,5 +1,6 @@
 //! Running an inference block: one chain, statement by statement.
 
+pub(super) mod banks;
 mod warmup;
 
 use super::build::{build, is_constant};
@@ -8,6 +9,7 @@ use super::expr::{Scope, evaluate};
 use super::init::{StartError, start_of, starts};
 use super::kernel::{At, Kernel, Outcome};
 use super::kernels::own::proposes;
+use super::neighbours::Banks;
 use super::population::Population;
 use super::record::Recorder;
 use super::selection::{fail, selector};
@@ -41,6 +43,8 @@ pub struct RunOptions {
     pub limits: Limits,
     /// Who looks at every draw.
     pub watch: Option<Arc<dyn Watch>>,
+    /// Who finds the neighbours that `knn` proposes from.
+    pub banks: Option<Arc<dyn Banks>>,
 }
 
 impl Default for RunOptions {
@@ -53,6 +57,7 @@ impl Default for RunOptions {
             incremental: true,
             limits: Limits::default(),
             watch: None,
+            banks: None,
         }
     }
 }
@@ -166,6 +171,7 @@ pub(crate) fn run_chain(
 ) -> Result<ChainResult, ChainError> {
     let started = Instant::now();
     let how = start_of(code, plan, options)?;
+    banks::check(plan, options)?;
     let mut begun = starts(code, options.seed, chain, how, options.limits).map_err(ChainError::Start)?;
     for trace in &mut begun {
         super::force::apply(code, trace, options, chain)?;
@@ -497,7 +503,7 @@ impl Runner<'_> {
             started: self.started,
             steps: self.step,
         };
-        let built = build(e, &self.frozen, &mut env)?;
+        let built = build(e, &self.frozen, self.options, &mut env)?;
         let i = match self.instances.iter().position(|i| i.signature == built.signature) {
             Some(i) => i,
             None => {

@@ -10,8 +10,7 @@ const CHOICES: &str = "Selections and starts";
 const MONITORS: &str = "Monitors and reports";
 
 /// What this version checks and documents but cannot run.
-pub(super) const PLANNED: &[&str] =
-    &["knn", "delayed", "smc", "abc", "marginal", "acceptance", "rhat", "ess", "snapshot"];
+pub(super) const PLANNED: &[&str] = &["delayed", "smc", "abc", "marginal", "acceptance", "rhat", "ess", "snapshot"];
 
 const fn name(
     name: &'static str,

@@ -1,0 +1,141 @@
+//! Which features a bank has, of a rendered scene and of what a run observes.
+
+use super::{BankError, command};
+use crate::Model;
+use crate::lang::builtins::scene::{ImageValue, KeypointsValue, ViewValue};
+use crate::lang::value::Value;
+use crate::render::{Contours, View};
+use crate::report::pictures::{Drawn, shaded};
+use crate::vision::Elements;
+use crate::vision::features::{self, Query};
+use serde::{Deserialize, Serialize};
+use std::sync::Arc;
+
+/// How features of a picture are found.
+#[derive(Clone, Debug, PartialEq, Eq, Serialize, Deserialize)]
+#[serde(tag = "kind", rename_all = "lowercase")]
+pub enum Features {
+    /// Pooled distances to contours, and oriented histograms of them.
+    Contours {
+        /// The longer side of the rendered picture, in pixels.
+        size: u32,
+    },
+    /// The positions of landmarks.
+    Keypoints {
+        /// Their names, in the order of the features; empty before anything is learnt.
+        names: Vec<String>,
+    },
+    /// Numbers that a command prints.
+    Command {
+        /// The command; `{png}` stands for the picture's file.
+        command: String,
+        /// The longer side of the rendered picture, in pixels.
+        size: u32,
+    },
+}
+
+impl Features {
+    /// The features of a scene's picture.
+    ///
+    /// # Errors
+    /// If a command fails, or the scene has no landmarks.
+    pub fn of(&self, view: &Arc<View>) -> Result<Vec<f32>, BankError> {
+        match self {
+            Features::Contours { size } => {
+                let contours = view.contours(*size);
+                Ok(features::contour_features(&features::rendered(&elements(&contours))))
+            }
+            Features::Keypoints { .. } => {
+                let (width, height) = (view.camera().width, view.camera().height);
+                let at: Vec<_> = ViewValue(Arc::clone(view)).landmarks(width, height).map(|(_, at)| at).collect();
+                match at.is_empty() {
+                    true => Err(BankError::Observed("the scene has no landmarks; learn with other features".into())),
+                    false => Ok(features::keypoint_features(&at, width, height)),
+                }
+            }
+            Features::Command { command, size } => {
+                let f = view.frame(*size);
+                let drawn =
+                    Drawn { width: f.width, height: f.height, depth: &f.depth, normal: &f.normal, part: &f.part };
+                command::features(command, &shaded(&drawn))
+            }
+        }
+    }
+
+    /// The same, knowing the landmarks of a scene.
+    pub(super) fn named(self, view: &View) -> Features {
+        match self {
+            Features::Keypoints { .. } => {
+                let names = view.solid().landmarks().iter().map(|l| l.name.to_string()).collect();
+                Features::Keypoints { names }
+            }
+            other => other,
+        }
+    }
+}
+
+fn elements(c: &Contours) -> Elements<'_> {
+    Elements { x: &c.x, y: &c.y, tx: &c.tx, ty: &c.ty, length: &c.length, width: c.width, height: c.height }
+}
+
+/// What a run observes that features can be found of.
+#[derive(Clone, Debug, Default)]
+pub struct Observed {
+    image: Option<Value>,
+    keypoints: Option<Value>,
+}
+
+impl Observed {
+    /// What a program is given: the first of its pictures, and the first of its sets of keypoints that has any.
+    pub fn of(model: &Model) -> Observed {
+        // What is given is a constant of the program.
+        let first = |fits: fn(&Value) -> bool| model.code().consts.iter().find(|v| fits(v)).cloned();
+        Observed {
+            image: first(|v| v.downcast::<ImageValue>().is_some()),
+            keypoints: first(|v| v.downcast::<KeypointsValue>().is_some_and(|k| !k.0.is_empty())),
+        }
+    }
+
+    /// The observed picture's features; `detector` is the command that the user trusts to find them, where one is needed.
+    ///
+    /// # Errors
+    /// If what they are of is not observed, or a command fails.
+    pub fn query(&self, features: &Features, detector: Option<&str>) -> Result<Query, BankError> {
+        let image = self.image.as_ref().and_then(|v| v.downcast::<ImageValue>());
+        let missing = |what: &str| BankError::Observed(format!("it is searched by {what}, and the run observes none"));
+        match features {
+            Features::Contours { .. } => {
+                Ok(Query::contours(&features::observed(image.ok_or_else(|| missing("a picture's contours"))?.map())))
+            }
+            Features::Keypoints { names } => {
+                let seen = self.keypoints.as_ref().and_then(|v| v.downcast::<KeypointsValue>());
+                let seen = &seen.ok_or_else(|| missing("keypoints"))?.0;
+                let size = match (seen.size().or(image.map(ImageValue::size)), seen.is_normalised()) {
+                    (Some(size), _) => size,
+                    (None, true) => (1, 1),
+                    (None, false) => {
+                        let what = "the keypoints do not say how large their picture is; give \"width\" and \"height\"";
+                        return Err(BankError::Observed(what.into()));
+                    }
+                };
+                let find = |name: &String| seen.points().iter().find(|p| *p.name == **name);
+                let at: Vec<_> = names.iter().map(|n| find(n).map(|p| seen.position(p, size))).collect();
+                if at.iter().all(Option::is_none) {
+                    return Err(missing("keypoints that the scene has"));
+                }
+                let sure: Vec<f64> = names.iter().map(|n| find(n).map_or(0.0, |p| p.confidence)).collect();
+                Ok(Query::keypoints(&at, &sure, size.0, size.1))
+            }
+            Features::Command { command, size } => {
+                if detector != Some(command) {
+                    let what = format!(
+                        "its features come from a command, which must be given again: --features-from '{command}'"
+                    );
+                    return Err(BankError::Observed(what));
+                }
+                let photo = image.and_then(ImageValue::as_photo).ok_or_else(|| missing("a photograph"))?;
+                Ok(Query::new(command::features(command, photo.shrunk(*size).rgb())?))
+            }
+        }
+    }
+}

@@ -1,0 +1,55 @@
+//! The banks of a run: files, found and searched once.
+
+use super::{Bank, BankError, Observed};
+use crate::Model;
+use crate::infer::{Banks, Neighbours};
+use crate::lang::load::reason;
+use std::collections::BTreeMap;
+use std::path::{Path, PathBuf};
+use std::sync::{Arc, Mutex, PoisonError};
+
+type Found = Result<Arc<Neighbours>, String>;
+
+/// Answers the kernels of a run from bank files: a path is looked for as it is, then beside the program.
+#[derive(Debug)]
+pub struct BankFiles {
+    program: String,
+    folder: PathBuf,
+    observed: Observed,
+    detector: Option<String>,
+    found: Mutex<BTreeMap<(String, usize), Found>>,
+}
+
+impl BankFiles {
+    /// For runs of a program with its data. `folder` is where the program is; `detector` the command that banks with features
+    /// from outside may run: none is run that the user has not named.
+    pub fn new(model: &Model, folder: &Path, detector: Option<String>) -> BankFiles {
+        BankFiles {
+            program: model.hash().to_owned(),
+            folder: folder.to_owned(),
+            observed: Observed::of(model),
+            detector,
+            found: Mutex::default(),
+        }
+    }
+
+    fn search(&self, path: &str, k: usize) -> Result<Neighbours, BankError> {
+        let beside = self.folder.join(path);
+        let as_given = Path::new(path);
+        let bank = Bank::open(if as_given.exists() || !beside.exists() { as_given } else { &beside })?;
+        bank.check(&self.program)?;
+        bank.neighbours(&self.observed.query(&bank.header().features, self.detector.as_deref())?, k)
+    }
+}
+
+impl Banks for BankFiles {
+    fn neighbours(&self, bank: &str, k: usize) -> Found {
+        let mut found = self.found.lock().unwrap_or_else(PoisonError::into_inner);
+        let search = || match self.search(bank, k) {
+            Ok(n) => Ok(Arc::new(n)),
+            Err(BankError::Io(e)) => Err(format!("the bank {bank} cannot be read: {}", reason(&e))),
+            Err(e) => Err(format!("the bank {bank} cannot be used: {e}")),
+        };
+        found.entry((bank.to_owned(), k)).or_insert_with(search).clone()
+    }
+}

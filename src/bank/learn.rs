@@ -1,0 +1,105 @@
+//! Making a bank: scenes from the prior, on several threads, each a function of the seed and its number alone.
+
+use super::write::BankWriter;
+use super::{BankError, Entry, Features, Named, as_view, picture};
+use crate::Model;
+use crate::lang::code::Operand;
+use crate::lang::value::Value;
+use crate::rng::{Purpose, StreamKey};
+use crate::trace::{Draws, Limits, Trace};
+use rayon::prelude::*;
+use std::path::Path;
+use std::sync::Arc;
+use std::sync::atomic::{AtomicU64, Ordering};
+
+/// Entries that are drawn before they are written.
+const BLOCK: u64 = 256;
+/// How often a draw may fail because the program has no value there before that is an error.
+const RETRIES: u64 = 100;
+
+/// What a bank is made of.
+#[derive(Clone, Debug)]
+pub struct Learn<'a> {
+    /// The program as errors of later runs should call it.
+    pub name: &'a str,
+    /// How many entries.
+    pub count: u64,
+    /// The seed: same seed, same bank.
+    pub seed: u64,
+    /// The number of threads.
+    pub threads: usize,
+    /// Which features.
+    pub features: Features,
+}
+
+/// Draws scenes from the prior and writes their latents and features to a file; `done` counts them as they come. The program
+/// may lack its data: what is observed is not asked.
+///
+/// # Errors
+/// If the program fails or has no picture, a detector fails, or the file cannot be written.
+pub fn learn(model: &Model, how: &Learn, path: &Path, done: &AtomicU64) -> Result<(), BankError> {
+    let prior = Trace::prior(Arc::clone(model.code()), Limits::default());
+    let operand = picture(&mut prior.clone(), draws(how.seed, 0, 0)).ok_or_else(|| {
+        BankError::Observed("the program has no picture: no top-level name is a view or a solid".into())
+    })?;
+    let mut features = how.features.clone();
+    let first = one(&prior, operand, how, 0, |view| features = features.clone().named(view))?;
+    let mut writer = BankWriter::create(path, how.count, first.features.len())?;
+    let pool = rayon::ThreadPoolBuilder::new().num_threads(how.threads).build();
+    let mut from = 0;
+    while from < how.count {
+        let to = (from + BLOCK).min(how.count);
+        let draw = |i: u64| {
+            let entry = one(&prior, operand, how, i, |_| ());
+            done.fetch_add(1, Ordering::Relaxed);
+            entry
+        };
+        let entries: Result<Vec<Entry>, BankError> = match &pool {
+            Ok(pool) => pool.install(|| (from..to).into_par_iter().map(draw).collect()),
+            Err(_) => (from..to).map(draw).collect(),
+        };
+        writer.add(&entries?)?;
+        from = to;
+    }
+    writer.finish(how.name, model.hash(), how.seed, features)
+}
+
+fn draws(seed: u64, i: u64, attempt: u64) -> Draws {
+    Draws { key: StreamKey::new(seed, u32::MAX, Purpose::START), step: i, lane: attempt }
+}
+
+/// Entry `i`.
+fn one(
+    prior: &Trace,
+    operand: Operand,
+    how: &Learn,
+    i: u64,
+    seen: impl FnOnce(&crate::render::View),
+) -> Result<Entry, BankError> {
+    let mut last = None;
+    for attempt in 0..RETRIES {
+        let mut trace = prior.clone();
+        match trace.imagine(&[operand], draws(how.seed, i, attempt), drawn) {
+            Ok((latents, value)) => {
+                let view = value.as_ref().and_then(|v| as_view(v, None)).ok_or_else(|| {
+                    BankError::Observed(format!("entry {i}: the picture is neither a view nor a solid in this scene"))
+                })?;
+                seen(&view);
+                return Ok(Entry { latents, features: how.features.of(&view)? });
+            }
+            Err(e) if e.is_recoverable() => last = Some(e),
+            Err(e) => return Err(BankError::Run(e)),
+        }
+    }
+    Err(last.map_or_else(|| BankError::Observed("no scene was drawn".into()), BankError::Run))
+}
+
+/// The choices of a trace by address hash, and the value it was asked for.
+fn drawn(trace: &Trace, mut values: Vec<Value>) -> (Vec<Named>, Option<Value>) {
+    let named = |t: &crate::trace::Target| {
+        let free = trace.free(*t).map(|(y, _)| y).filter(|y| !y.is_empty());
+        let (hash, address) = (trace.address_hash(*t), trace.address(*t).to_string());
+        Some(Named { hash, address, stored: trace.stored(*t)?, free })
+    };
+    (trace.all_targets().iter().filter_map(named).collect(), values.pop())
+}

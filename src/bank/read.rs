@@ -1,0 +1,174 @@
+//! Reading a bank: features block by block, latents of chosen entries only, so that it need not fit into memory.
+
+use super::format::{Header, Preamble, START, fnv};
+use super::record::{decode, latents};
+use super::{BankError, Named};
+use crate::infer::Neighbours;
+use crate::vision::features::Query;
+use std::fs::File;
+use std::io::{Read, Seek, SeekFrom};
+use std::path::Path;
+use std::sync::{Mutex, PoisonError};
+
+/// Bytes of features read at a time, about.
+const BLOCK: u64 = 1 << 20;
+/// The longest entry, table of addresses or row of features that is believed, in bytes.
+const LONGEST: u64 = 1 << 28;
+/// Entries whose latents tell the spread of each coordinate.
+const SAMPLE: u64 = 256;
+
+/// A bank in a file.
+#[derive(Debug)]
+pub struct Bank {
+    file: Mutex<File>,
+    preamble: Preamble,
+    header: Header,
+    addresses: Vec<(u64, String)>,
+}
+
+impl Bank {
+    /// Opens a bank and reads its header.
+    ///
+    /// # Errors
+    /// If it cannot be read, or is no whole bank of this version.
+    pub fn open(path: &Path) -> Result<Bank, BankError> {
+        let mut file = File::open(path)?;
+        let length = file.metadata()?.len();
+        let mut start = Vec::new();
+        (&mut file).take(START).read_to_end(&mut start)?;
+        let preamble = Preamble::decode(&start, length)?;
+        if length - preamble.header > LONGEST || preamble.width.saturating_mul(4) > LONGEST {
+            return Err(BankError::Damaged("its header or its rows are too long".into()));
+        }
+        let text = bytes(&mut file, preamble.header, length - preamble.header)?;
+        if fnv(&text) != preamble.hash {
+            return Err(BankError::Damaged("its header was changed, or ends too early".into()));
+        }
+        let header: Header = serde_json::from_slice(&text).map_err(|e| BankError::Damaged(e.to_string()))?;
+        let hash = |(h, name): &(String, String)| Some((u64::from_str_radix(h, 16).ok()?, name.clone()));
+        let addresses: Option<Vec<_>> = header.addresses.iter().map(hash).collect();
+        let addresses = addresses.ok_or_else(|| BankError::Damaged("an address has no hash".into()))?;
+        Ok(Bank { file: Mutex::new(file), preamble, header, addresses })
+    }
+
+    /// What it is of.
+    pub fn header(&self) -> &Header {
+        &self.header
+    }
+
+    /// The number of entries.
+    pub fn len(&self) -> usize {
+        self.preamble.count as usize
+    }
+
+    /// Whether it has none: never, for a bank that opens.
+    pub fn is_empty(&self) -> bool {
+        self.len() == 0
+    }
+
+    /// Checks that the bank is of this program.
+    ///
+    /// # Errors
+    /// If it is of another, of another version of it, or of other parameters.
+    pub fn check(&self, program: &str) -> Result<(), BankError> {
+        if self.header.program == program {
+            return Ok(());
+        }
+        let (name, found) = (self.header.name.clone(), self.header.program.clone());
+        Err(BankError::Program { name, found, expected: program.to_owned() })
+    }
+
+    fn read(&self, at: u64, length: u64) -> Result<Vec<u8>, BankError> {
+        Ok(bytes(&mut self.file.lock().unwrap_or_else(PoisonError::into_inner), at, length)?)
+    }
+
+    /// Features of `count` entries from entry `i` on, one after the other.
+    fn rows(&self, i: u64, count: u64) -> Result<Vec<f32>, BankError> {
+        let width = 4 * self.preamble.width;
+        let bytes = self.read(START + i * width, count * width)?;
+        Ok(bytes.chunks_exact(4).map(|b| b.try_into().map_or(0.0, f32::from_le_bytes)).collect())
+    }
+
+    /// The features of an entry.
+    ///
+    /// # Errors
+    /// If there is no such entry, or it cannot be read.
+    pub fn features(&self, i: usize) -> Result<Vec<f32>, BankError> {
+        self.place(i)?;
+        self.rows(i as u64, 1)
+    }
+
+    /// Where the latents of an entry begin and end.
+    fn place(&self, i: usize) -> Result<(u64, u64), BankError> {
+        if i >= self.len() {
+            return Err(BankError::Damaged(format!("there is no entry {i} among {}", self.len())));
+        }
+        let both = self.read(self.preamble.table + 8 * i as u64, 16)?;
+        let word = |k: usize| both.get(k..k + 8).and_then(|b| b.try_into().ok()).map_or(0, u64::from_le_bytes);
+        let (from, to) = (word(0), word(8));
+        if from > to || to > self.preamble.table || to - from > LONGEST {
+            return Err(BankError::Damaged(format!("the place of entry {i} is wrong")));
+        }
+        Ok((from, to))
+    }
+
+    /// The choices of an entry.
+    ///
+    /// # Errors
+    /// As [`Bank::features`].
+    pub fn latents(&self, i: usize) -> Result<Vec<Named>, BankError> {
+        let (from, to) = self.place(i)?;
+        let bytes = self.read(from, to - from)?;
+        decode(&bytes, &self.addresses).ok_or_else(|| BankError::Damaged(format!("entry {i} cannot be read")))
+    }
+
+    /// The `k` entries whose pictures are most like a picture, the nearest first, each with its squared distance.
+    ///
+    /// # Errors
+    /// If the picture has another number of features, or the file cannot be read.
+    pub fn nearest(&self, query: &Query, k: usize) -> Result<Vec<(usize, f32)>, BankError> {
+        let (width, count) = (self.preamble.width, self.preamble.count);
+        if query.len() as u64 != width {
+            let message = format!("the observed picture has {} features, those of the bank have {width}", query.len());
+            return Err(BankError::Command(message));
+        }
+        let rows = (BLOCK / (4 * width).max(1)).max(1);
+        let mut best: Vec<(usize, f32)> = Vec::with_capacity(k + 1);
+        let mut first = 0;
+        while first < count && k > 0 {
+            let n = rows.min(count - first);
+            let block = self.rows(first, n)?;
+            for (j, features) in block.chunks_exact(width.max(1) as usize).enumerate() {
+                let d = query.distance(features);
+                // Of equals the earlier goes first.
+                let at = best.partition_point(|(_, b)| *b <= d);
+                if at < k {
+                    best.insert(at, (first as usize + j, d));
+                    best.truncate(k);
+                }
+            }
+            first += n;
+        }
+        Ok(best)
+    }
+
+    /// The latents of the `k` nearest entries, ready for proposals.
+    ///
+    /// # Errors
+    /// As [`Bank::nearest`].
+    pub fn neighbours(&self, query: &Query, k: usize) -> Result<Neighbours, BankError> {
+        let near = self.nearest(query, k)?.into_iter().map(|(i, _)| i);
+        let step = self.preamble.count.div_ceil(SAMPLE).max(1) as usize;
+        let read = |i: usize| Ok::<_, BankError>(latents(&self.latents(i)?));
+        let entries = near.map(read).collect::<Result<Vec<_>, _>>()?;
+        let among = (0..self.len()).step_by(step).map(read).collect::<Result<Vec<_>, _>>()?;
+        Ok(Neighbours::new(entries, &among))
+    }
+}
+
+fn bytes(file: &mut File, at: u64, length: u64) -> std::io::Result<Vec<u8>> {
+    let mut bytes = vec![0; length as usize];
+    file.seek(SeekFrom::Start(at))?;
+    file.read_exact(&mut bytes)?;
+    Ok(bytes)
+}

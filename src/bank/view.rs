@@ -1,0 +1,34 @@
+//! The picture of a scene: where a program keeps its view.
+
+use crate::lang::builtins::scene::{SolidValue, ViewValue};
+use crate::lang::code::Operand;
+use crate::lang::value::Value;
+use crate::render::{Camera, View};
+use crate::trace::{Draws, Trace};
+use std::sync::Arc;
+
+/// Where a program keeps its picture: the last top-level name that is a view, or else the last that is a solid.
+pub fn picture(trace: &mut Trace, draws: Draws) -> Option<Operand> {
+    let globals: Vec<Operand> = trace.code().globals.values().rev().copied().collect();
+    let mut solid = None;
+    for o in globals {
+        let Ok(values) = trace.query(&[o], draws) else { continue };
+        let Some(v) = values.first() else { continue };
+        if v.downcast::<ViewValue>().is_some() {
+            return Some(o);
+        }
+        if solid.is_none() && v.downcast::<SolidValue>().is_some() {
+            solid = Some(o);
+        }
+    }
+    solid
+}
+
+/// A view, or a solid before a camera (the default one, if there is none).
+pub fn as_view(value: &Value, camera: Option<Camera>) -> Option<Arc<View>> {
+    if let Some(v) = value.downcast::<ViewValue>() {
+        return Some(Arc::clone(&v.0));
+    }
+    let camera = camera.unwrap_or_else(|| Camera::default_for(256, 256));
+    value.downcast::<SolidValue>().map(|s| Arc::new(View::new(s.0.clone(), camera)))
+}

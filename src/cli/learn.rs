@@ -1,0 +1,45 @@
+//! `pcadlang learn`: a bank of scenes from the prior.
+
+use super::args::{FeatureKind, Learn};
+use super::{Failure, given, job, plain, progress};
+use pcadlang::bank::{self, BankError, Features};
+use pcadlang::lang::load::reason;
+use pcadlang::report::seconds;
+use std::sync::atomic::{AtomicBool, AtomicU64, Ordering};
+use std::time::Instant;
+
+/// Draws scenes and writes the bank.
+pub fn learn(a: &Learn) -> Result<(), Failure> {
+    let begun = Instant::now();
+    let model = given::program(&a.given, a.quiet)?.without_data().compile()?;
+    let size = a.features_size;
+    let features = match (&a.features_from, a.features) {
+        (Some(command), _) => Features::Command { command: command.clone(), size },
+        (None, FeatureKind::Contours) => Features::Contours { size },
+        (None, FeatureKind::Keypoints) => Features::Keypoints { names: Vec::new() },
+    };
+    let how = bank::Learn {
+        name: &a.given.program,
+        count: u64::from(a.n),
+        seed: a.seed,
+        threads: a.threads.map_or_else(job::machine_threads, |n| n as usize),
+        features,
+    };
+    let (done, over) = (AtomicU64::new(0), AtomicBool::new(false));
+    let learnt = std::thread::scope(|scope| {
+        scope.spawn(|| progress::count(&done, how.count, &over, a.quiet));
+        let learnt = bank::learn(&model, &how, &a.out, &done);
+        over.store(true, Ordering::Relaxed);
+        learnt
+    });
+    learnt.map_err(|e| match e {
+        BankError::Run(e) => Failure::from(model.run_error(*e)),
+        BankError::Io(e) => plain(format!("cannot write {}: {}", a.out.display(), reason(&e))),
+        other => plain(other.to_string()),
+    })?;
+    if !a.quiet {
+        let took = seconds(begun.elapsed().as_secs_f64());
+        println!("{}: {} scenes from the prior in {took}, seed {}", a.out.display(), a.n, a.seed);
+    }
+    Ok(())
+}

@@ -1,0 +1,274 @@
+//! Features of pictures: short lists of numbers by which pictures that look alike are found.
+//!
+//! Contours give pooled distances to the nearest contour, and oriented histograms of contour length in cells as HOG has them
+//! (Dalal & Triggs 2005); keypoints give their positions. The same functions serve rendered and observed pictures, in units of
+//! the longer side about the picture's middle, so that sizes need not agree. Not a comparator: nothing here is a density.
+//! Invariant: features are finite, and as many whatever the picture.
+
+use super::{ContourMap, Elements, distance_transform};
+
+/// Pixels along a side of the square in which distances are taken.
+const SIDE: usize = 64;
+/// Distances are averaged over blocks of so many pixels.
+const POOL: usize = 4;
+/// Distances beyond this, in pixels of that square, are as far as can be: a sixth of the picture.
+const FAR: f32 = 10.0;
+/// Cells along a side, and orientations in a cell, of the histograms.
+const CELLS: usize = 8;
+const ORIENTATIONS: usize = 4;
+/// The number of features of contours.
+pub const CONTOUR_FEATURES: usize = (SIDE / POOL) * (SIDE / POOL) + CELLS * CELLS * ORIENTATIONS;
+
+/// How far a picture may be moved to look more like another, in units of its longer side, and the sizes it may take.
+const SHIFTS: [f32; 3] = [0.0, -0.05, 0.05];
+const SCALES: [f32; 3] = [1.0, 0.9, 1.11];
+
+/// A short piece of contour, in units of the picture's longer side, from its middle; x to the right, y down.
+#[derive(Clone, Copy, Debug, PartialEq)]
+pub struct Stroke {
+    /// Its middle.
+    pub at: [f32; 2],
+    /// Its direction; the sign means nothing.
+    pub along: [f32; 2],
+    /// Its length.
+    pub length: f32,
+}
+
+/// A place of a picture of some size in pixels, in units of its longer side from its middle.
+fn centred(x: f32, y: f32, width: u32, height: u32) -> [f32; 2] {
+    let longer = width.max(height).max(1) as f32;
+    [(x - width as f32 / 2.0) / longer, (y - height as f32 / 2.0) / longer]
+}
+
+/// Rendered contours as strokes.
+pub fn rendered(e: &Elements) -> Vec<Stroke> {
+    let longer = e.width.max(e.height).max(1) as f32;
+    let stroke = |p: super::elements::Element| Stroke {
+        at: centred(p.x, p.y, e.width, e.height),
+        along: [p.tx, p.ty],
+        length: p.length * p.weight / longer,
+    };
+    e.in_view().map(stroke).collect()
+}
+
+/// Observed contours as strokes: every point is about a pixel long.
+pub fn observed(m: &ContourMap) -> Vec<Stroke> {
+    let longer = m.width.max(m.height).max(1) as f32;
+    let lists = m.x.iter().zip(&m.y).zip(m.tx.iter().zip(&m.ty));
+    let stroke = |((x, y), (tx, ty)): ((&f32, &f32), (&f32, &f32))| Stroke {
+        at: centred(*x, *y, m.width, m.height),
+        along: [*tx, *ty],
+        length: 1.0 / longer,
+    };
+    lists.map(stroke).collect()
+}
+
+/// The features of contours: [`CONTOUR_FEATURES`] numbers. Pooled distances first, from 0 on a contour to 1 far from any,
+/// together weighed as one number; then the square roots of the shares of the length in each cell and orientation, whose squares
+/// sum to 1 where there are contours.
+pub fn contour_features(strokes: &[Stroke]) -> Vec<f32> {
+    let mut features = pooled_distances(strokes);
+    features.extend(histograms(strokes));
+    features
+}
+
+fn pooled_distances(strokes: &[Stroke]) -> Vec<f32> {
+    let mut set = vec![false; SIDE * SIDE];
+    for s in strokes {
+        let [x, y] = s.at.map(|v| (v + 0.5) * SIDE as f32);
+        if x >= 0.0 && y >= 0.0 && x < SIDE as f32 && y < SIDE as f32 {
+            set[y as usize * SIDE + x as usize] = true;
+        }
+    }
+    let distances = distance_transform(SIDE as u32, SIDE as u32, &set).values;
+    let blocks = SIDE / POOL;
+    let mut pooled = vec![0.0; blocks * blocks];
+    for (i, d) in distances.iter().enumerate() {
+        pooled[i / SIDE / POOL * blocks + i % SIDE / POOL] += d.min(FAR) / (FAR * (POOL * POOL) as f32);
+    }
+    let weight = 1.0 / blocks as f32;
+    pooled.iter().map(|p| p * weight).collect()
+}
+
+/// Length by cell and orientation, each piece shared between the nearest cells and orientations.
+fn histograms(strokes: &[Stroke]) -> Vec<f32> {
+    let mut lengths = vec![0.0f32; CELLS * CELLS * ORIENTATIONS];
+    for s in strokes.iter().filter(|s| (s.at[0] + s.at[1] + s.along[0] + s.along[1] + s.length).is_finite()) {
+        let angle = libm::atan2f(s.along[1], s.along[0]) / std::f32::consts::PI;
+        let turn = (angle - angle.floor()) * ORIENTATIONS as f32;
+        let [x, y] = s.at.map(|v| (v + 0.5) * CELLS as f32 - 0.5);
+        for (column, wx) in split(x) {
+            for (row, wy) in split(y) {
+                let inside = |i: i32| (0..CELLS as i32).contains(&i);
+                if !(inside(column) && inside(row)) {
+                    continue;
+                }
+                for (o, wo) in split(turn) {
+                    let bin = o.rem_euclid(ORIENTATIONS as i32) as usize;
+                    lengths[(row as usize * CELLS + column as usize) * ORIENTATIONS + bin] += s.length * wx * wy * wo;
+                }
+            }
+        }
+    }
+    let total: f32 = lengths.iter().sum();
+    if total > 0.0 {
+        lengths.iter_mut().for_each(|l| *l = (*l / total).sqrt());
+    }
+    lengths
+}
+
+/// The whole numbers next to a number, and its share in each.
+fn split(x: f32) -> [(i32, f32); 2] {
+    let low = x.floor();
+    [(low as i32, 1.0 - (x - low)), (low as i32 + 1, x - low)]
+}
+
+/// The features of keypoints, some of which may be missing: positions in pixels of a picture.
+pub fn keypoint_features(points: &[Option<[f64; 2]>], width: u32, height: u32) -> Vec<f32> {
+    // What is not there is in the middle, and what is far off is far.
+    let near = |x: f64| x.clamp(-1e9, 1e9) as f32;
+    let at = |p: &Option<[f64; 2]>| p.map_or([0.0; 2], |p| centred(near(p[0]), near(p[1]), width, height));
+    points.iter().flat_map(at).map(|v| if v.is_finite() { v.clamp(-10.0, 10.0) } else { 0.0 }).collect()
+}
+
+/// An observed picture that others are compared with.
+#[derive(Clone, Debug, PartialEq)]
+pub struct Query {
+    /// Its features, as it is and a little moved.
+    variants: Vec<Vec<f32>>,
+    /// What each feature counts.
+    weights: Vec<f32>,
+}
+
+impl Query {
+    /// Features that are compared as they are.
+    pub fn new(features: Vec<f32>) -> Query {
+        Query { weights: vec![1.0; features.len()], variants: vec![features] }
+    }
+
+    /// Contours, compared also after small shifts (a twentieth of the longer side) and changes of size (a tenth): a scene of
+    /// the right shape should be found though it is not quite in the right place.
+    pub fn contours(strokes: &[Stroke]) -> Query {
+        let moved = |(dx, dy, scale): (f32, f32, f32)| {
+            let to = |s: &Stroke| Stroke { at: [s.at[0] * scale + dx, s.at[1] * scale + dy], ..*s };
+            contour_features(&strokes.iter().map(to).collect::<Vec<_>>())
+        };
+        Query { variants: movements().map(moved).collect(), weights: vec![1.0; CONTOUR_FEATURES] }
+    }
+
+    /// Keypoints with the confidence in each, compared also after the same movements. Missing ones do not count.
+    pub fn keypoints(points: &[Option<[f64; 2]>], confidence: &[f64], width: u32, height: u32) -> Query {
+        let here = keypoint_features(points, width, height);
+        let moved = |(dx, dy, scale): (f32, f32, f32)| {
+            here.chunks(2).flat_map(|p| [p[0] * scale + dx, p.get(1).map_or(0.0, |y| y * scale + dy)]).collect()
+        };
+        let weight = |(i, p): (usize, &Option<[f64; 2]>)| match p {
+            Some(_) => [confidence.get(i).map_or(1.0, |c| *c as f32); 2],
+            None => [0.0; 2],
+        };
+        let weights = points.iter().enumerate().flat_map(weight).collect();
+        Query { variants: movements().map(moved).collect(), weights }
+    }
+
+    /// The number of features.
+    pub fn len(&self) -> usize {
+        self.weights.len()
+    }
+
+    /// Whether there are none.
+    pub fn is_empty(&self) -> bool {
+        self.weights.is_empty()
+    }
+
+    /// The squared distance to features of the same kind: of all variants the least.
+    pub fn distance(&self, features: &[f32]) -> f32 {
+        let to = |v: &Vec<f32>| -> f32 {
+            let terms = v.iter().zip(features).zip(&self.weights).map(|((a, b), w)| w * (a - b) * (a - b));
+            // NaN, from a detector of the user's, is far from everything.
+            Some(terms.sum::<f32>()).filter(|d| !d.is_nan()).unwrap_or(f32::INFINITY)
+        };
+        self.variants.iter().map(to).fold(f32::INFINITY, f32::min)
+    }
+}
+
+/// Shifts and sizes that are tried, the picture as it is first.
+fn movements() -> impl Iterator<Item = (f32, f32, f32)> {
+    SCALES.into_iter().flat_map(|s| SHIFTS.into_iter().flat_map(move |x| SHIFTS.into_iter().map(move |y| (x, y, s))))
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    /// A circle of pieces in a picture of some size.
+    fn circle(cx: f32, cy: f32, r: f32, width: u32, height: u32) -> Vec<Stroke> {
+        let n = 400;
+        let at = |f: fn(f32) -> f32, c: f32| -> Vec<f32> {
+            (0..n).map(|i| c + r * f(i as f32 / n as f32 * std::f32::consts::TAU)).collect()
+        };
+        let (x, y) = (at(libm::cosf, cx), at(libm::sinf, cy));
+        let tx: Vec<f32> = y.iter().map(|y| (y - cy) / r).collect();
+        let ty: Vec<f32> = x.iter().map(|x| (cx - x) / r).collect();
+        let length = vec![1.0; n];
+        rendered(&Elements { x: &x, y: &y, tx: &tx, ty: &ty, length: &length, width, height })
+    }
+
+    #[test]
+    fn features_do_not_depend_on_the_size_of_the_picture() {
+        let (a, b) = (circle(60.0, 70.0, 30.0, 128, 128), circle(120.0, 140.0, 60.0, 256, 256));
+        let (a, b) = (contour_features(&a), contour_features(&b));
+        assert_eq!(a.len(), CONTOUR_FEATURES);
+        let d = Query::new(a.clone()).distance(&b);
+        assert!(d < 1e-4, "{d}");
+        assert_eq!(a, contour_features(&circle(60.0, 70.0, 30.0, 128, 128)));
+        let squares: f32 = a[(SIDE / POOL) * (SIDE / POOL)..].iter().map(|x| x * x).sum();
+        assert!((squares - 1.0).abs() < 1e-5);
+    }
+
+    #[test]
+    fn rendered_and_observed_contours_agree() {
+        let strokes = circle(60.0, 70.0, 30.0, 128, 100);
+        let mut map = ContourMap::new(128, 100);
+        for s in &strokes {
+            map.x.push(s.at[0] * 128.0 + 64.0);
+            map.y.push(s.at[1] * 128.0 + 50.0);
+            // The sense of a tangent means nothing.
+            map.tx.push(-s.along[0]);
+            map.ty.push(-s.along[1]);
+            map.strength.push(0.7);
+        }
+        let d = Query::new(contour_features(&strokes)).distance(&contour_features(&observed(&map)));
+        assert!(d < 2e-3, "{d}");
+    }
+
+    #[test]
+    fn distances_order_pictures_and_small_movements_are_forgiven() {
+        let here = circle(64.0, 64.0, 30.0, 128, 128);
+        let q = Query::contours(&here);
+        let to = |x: f32, r: f32| q.distance(&contour_features(&circle(x, 64.0, r, 128, 128)));
+        assert_eq!(to(64.0, 30.0), 0.0);
+        assert!(to(64.0, 30.0) < to(68.0, 30.0) && to(68.0, 30.0) < to(80.0, 30.0) && to(80.0, 30.0) < to(80.0, 10.0));
+        let stiff =
+            Query::new(contour_features(&here)).distance(&contour_features(&circle(70.4, 64.0, 30.0, 128, 128)));
+        assert!(to(70.4, 30.0) < 0.2 * stiff, "{} against {stiff}", to(70.4, 30.0));
+    }
+
+    #[test]
+    fn nothing_in_view_and_nonsense_are_features_too() {
+        let none = contour_features(&[]);
+        assert!(none.len() == CONTOUR_FEATURES && none.iter().all(|x| x.is_finite()));
+        let off = Stroke { at: [9.0, f32::NAN], along: [f32::NAN, 0.0], length: 1.0 };
+        assert!(contour_features(&[off]).iter().all(|x| x.is_finite()));
+        assert_eq!(Query::new(vec![0.0]).distance(&[f32::NAN]), f32::INFINITY);
+    }
+
+    #[test]
+    fn missing_keypoints_do_not_count() {
+        let q = Query::keypoints(&[Some([50.0, 50.0]), None], &[1.0, 1.0], 100, 100);
+        let there = |second: Option<[f64; 2]>| keypoint_features(&[Some([50.0, 50.0]), second], 100, 100);
+        assert_eq!(q.distance(&there(Some([0.0, 0.0]))), 0.0);
+        assert_eq!(q.distance(&there(None)), 0.0);
+        assert!(q.distance(&keypoint_features(&[Some([80.0, 50.0]), None], 100, 100)) > 0.01);
+        assert_eq!(keypoint_features(&[Some([f64::NAN, 1e300])], 100, 100), [0.0, 10.0]);
+    }
+}
