@@ -2,11 +2,13 @@
 //! same on every platform.
 
 mod exact;
+mod incomplete;
 mod saddle;
 mod special;
 mod tails;
 
 pub use exact::ExactSum;
+pub use incomplete::{chi_square_tail, upper_gamma};
 pub use saddle::{deviance, stirling_error};
 pub use special::{
     LN_SQRT_2PI, digamma, expit, inv_normal_cdf, ln_beta, ln_choose, ln_factorial, ln_gamma, log_diff_exp,

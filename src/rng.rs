@@ -23,6 +23,10 @@ impl Purpose {
     pub const MIX: Purpose = Purpose(5);
     /// Which members of a population go on.
     pub const POPULATION: Purpose = Purpose(6);
+    /// States drawn from the prior to simulate data from.
+    pub const TRUTH: Purpose = Purpose(7);
+    /// Observations drawn anew.
+    pub const REPLICATE: Purpose = Purpose(8);
 }
 
 /// The part of a stream's identity that stays the same through a run.

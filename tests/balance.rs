@@ -239,159 +239,60 @@ fn all_balanced(case: &Case, steps: usize, kernels: &[&str]) {
     kernels.iter().for_each(|k| balanced(case, k, steps));
 }
 
-/// A kernel and, every other time, one that reaches everything.
-macro_rules! with_mh {
-    ($k:literal) => {
-        concat!("mix { 0.6 => ", $k, "; 0.4 => mh(one(@**)); }")
-    };
-}
-
 #[test]
 fn discrete_choices() {
-    let kernels = [
-        "mh(one(@**))",
-        "block(@**)",
-        "block(one(@**))",
-        "gibbs(one(@**))",
-        "drift(one(@**), 1)",
-        "drift(@**, 1)",
-        with_mh!("gibbs(@a)"),
-        with_mh!("mh(@b)"),
-        with_mh!("drift(@a, 1)"),
-    ];
-    all_balanced(&DISCRETE, 20_000, &kernels);
+    all_balanced(&DISCRETE, 20_000, kernels::balance::DISCRETE);
 }
 
 #[test]
 fn choices_that_appear_and_vanish() {
-    let kernels = [
-        "mh(one(@**))",
-        "block(@**)",
-        "block(one(@**))",
-        "drift(one(@**), 0.7)",
-        "drift(@**, 0.7)",
-        with_mh!("gibbs(@c)"),
-        with_mh!("gibbs(one($finite))"),
-        with_mh!("drift($continuous, 0.8)"),
-        with_mh!("hmc($continuous, steps = 3)"),
-        with_mh!("mala($continuous)"),
-        with_mh!("nuts($continuous)"),
-        with_mh!("slice($continuous)"),
-        with_mh!("block(@x/**)"),
-    ];
-    all_balanced(&STRUCTURE, 20_000, &kernels);
+    all_balanced(&STRUCTURE, 20_000, kernels::balance::STRUCTURE);
 }
 
 #[test]
 fn one_address_in_two_branches() {
-    let kernels = [
-        "mh(one(@**))",
-        "block(@**)",
-        "drift(one(@**), 0.7)",
-        "drift(@**, 0.7)",
-        with_mh!("gibbs(@c)"),
-        with_mh!("drift(@x/a, 0.8)"),
-    ];
-    all_balanced(&SHARED, 20_000, &kernels);
+    all_balanced(&SHARED, 20_000, kernels::balance::SHARED);
 }
 
 #[test]
 fn values_that_depend_on_another_choice() {
-    let kernels = [
-        "mix { 0.5 => mh(one(@**)); 0.5 => block(@**); }",
-        "block(@**)",
-        "mix { 0.5 => drift(@**, 1); 0.5 => block(@**); }",
-        "mix { 0.5 => drift(one(@**), 1); 0.5 => block(@**); }",
-        "mix { 0.5 => gibbs(one(@**)); 0.5 => block(@**); }",
-    ];
-    all_balanced(&FINITE_SUPPORT, 20_000, &kernels);
+    all_balanced(&FINITE_SUPPORT, 20_000, kernels::balance::FINITE_SUPPORT);
 }
 
 #[test]
 fn arrays_that_change_length() {
-    let kernels = [
-        "mh(one(@**))",
-        "block(@**)",
-        "drift(one(@**), 0.8)",
-        "drift(@**, 0.6)",
-        "mix { 0.5 => gibbs(@n); 0.5 => drift(@z, 0.7); }",
-        with_mh!("drift(one(@z), 0.7)"),
-    ];
-    all_balanced(&ELEMENTS, 20_000, &kernels);
+    all_balanced(&ELEMENTS, 20_000, kernels::balance::ELEMENTS);
 }
 
 #[test]
 fn shared_choices_that_appear_and_vanish() {
-    let kernels = [
-        "mh(one(@**))",
-        "block(@**)",
-        "drift(one(@**), 0.8)",
-        with_mh!("drift(@**, 0.6)"),
-        "mix { 0.5 => gibbs(one($finite)); 0.5 => drift($continuous, 0.8); }",
-        "mix { 0.5 => block(one($finite)); 0.5 => mh(one($continuous)); }",
-    ];
-    all_balanced(&SHARED_GROUPS, 20_000, &kernels);
+    all_balanced(&SHARED_GROUPS, 20_000, kernels::balance::SHARED_GROUPS);
 }
 
 #[test]
 fn unbounded_whole_numbers() {
-    let kernels = [
-        "mh(one(@**))",
-        "block(@**)",
-        "drift(one(@**), 1)",
-        with_mh!("drift(@**, 1)"),
-        "mix { 0.5 => gibbs(@k); 0.5 => drift(@n, 2); }",
-    ];
-    all_balanced(&COUNTS, 20_000, &kernels);
+    all_balanced(&COUNTS, 20_000, kernels::balance::COUNTS);
 }
 
 #[test]
 fn bounds_that_depend_on_another_choice() {
-    let kernels = [
-        "mh(one(@**))",
-        "block(@**)",
-        "drift(one(@**), 1)",
-        "drift(@**, 0.8)",
-        with_mh!("drift(@p1, 1)"),
-        with_mh!("mh(@p2)"),
-        "hmc(@**, steps = 3)",
-        "mala(@**)",
-        "nuts(@**)",
-        "slice(one(@**))",
-        with_mh!("slice(@p1, width = 2)"),
-    ];
-    all_balanced(&SUPPORT, 20_000, &kernels);
+    all_balanced(&SUPPORT, 20_000, kernels::balance::SUPPORT);
 }
 
 #[test]
 fn gaussian_choices() {
-    let kernels = [
-        "elliptical(@**)",
-        "elliptical(one(@**))",
-        with_mh!("elliptical(@a)"),
-        with_mh!("elliptical(@b)"),
-        "drift(@**, 0.9)",
-        "drift(one(@**), 1.2)",
-        "mh(one(@**))",
-        "block(@**)",
-    ];
-    all_balanced(&GAUSSIAN, 20_000, &kernels);
+    all_balanced(&GAUSSIAN, 20_000, kernels::balance::GAUSSIAN);
 }
 
 /// Neighbours that have nothing to do with the data, and few of them: the density of the proposal is in the ratio.
 #[test]
 fn proposals_from_wrong_neighbours() {
-    let all = [
-        "knn(@**, bank = \"b\")",
-        "mix { 0.6 => knn(one(@**), bank = \"b\", k = 2); 0.4 => block(@**); }",
-        "mix { 0.6 => knn(@**, bank = \"b\", k = 1); 0.4 => block(@**); }",
-    ];
     for case in
         [&DISCRETE, &STRUCTURE, &SHARED, &FINITE_SUPPORT, &SUPPORT, &GAUSSIAN, &ELEMENTS, &SHARED_GROUPS, &COUNTS]
     {
-        all_balanced(case, 20_000, &all);
+        all_balanced(case, 20_000, kernels::balance::NEIGHBOURS);
     }
-    all_balanced(&STRUCTURE, 20_000, &[with_mh!("knn($continuous, bank = \"b\")"), with_mh!("knn(@c, bank = \"b\")")]);
+    all_balanced(&STRUCTURE, 20_000, kernels::balance::NEIGHBOURS_OF_SOME);
 }
 
 /// Getting it right (Geweke 2004): data drawn anew given the parameters, then the parameters moved given the data, by turns.
@@ -399,7 +300,7 @@ fn proposals_from_wrong_neighbours() {
 /// which takes them from their prior given the rest.
 #[test]
 fn parameters_and_data_by_turns() {
-    for kernel in ["mh(one(%))", "block(%)", "drift(%, 0.7)", "drift(one(%), 1)"] {
+    for kernel in kernels::BY_TURNS {
         let k = kernel.replace('%', "(@s + @m + @w)");
         let text = format!(
             "assume s ~ gamma(3, 3); assume m ~ normal(0, 1); assume w ~ beta(2, 2);

@@ -76,18 +76,69 @@ fn doc() {
 
 #[test]
 fn help() {
-    let all: [&[&str]; 9] = [
+    let all: [&[&str]; 10] = [
         &["--help"],
         &["run", "--help"],
         &["evaluate", "--help"],
         &["sample", "--help"],
         &["learn", "--help"],
         &["check", "--help"],
+        &["predict", "--help"],
         &["contours", "--help"],
         &["doc", "--help"],
         &["--version"],
     ];
     sessions("help", &all);
+}
+
+/// Plans on data simulated from their programs: exit code 0 where they pass, 1 where not and where nothing can be simulated.
+#[test]
+fn checks_by_simulation() {
+    let f = Folder::new("simulation");
+    let args = ["--replicates", "20", "--steps", "200", "--seed", "3", "--threads", "2"];
+    let both = f.succeeds(&[&["check", "--sbc", "--geweke", "coin.pcad"][..], &args].concat());
+    for says in
+        ["coin.pcad: simulation-based calibration", "coin.pcad: Geweke's joint", "@heads", "log joint", "seed 3"]
+    {
+        assert!(both.out.contains(says), "{says:?} is not in\n{}", both.out);
+    }
+    // A plan that never moves keeps the prior: wrong for any data that say something.
+    f.write(
+        "stuck.pcad",
+        "assume x ~ normal(0, 1); observe normal(x, 0.1) = [1, 1, 1] as y;
+         infer { repeat 100 { drift(@x, 1000000); collect x; } }",
+    );
+    let d = f.run(&["check", "--sbc", "stuck.pcad", "--replicates", "60", "--steps", "100", "--seed", "3"]);
+    assert!(d.code == 1 && d.out.contains("FAILS") && d.err.contains("1 of 1 programs fail"), "{}{}", d.out, d.err);
+    f.write("soft.pcad", "assume x ~ normal(0, 1); factor(-x * x) as soft;");
+    let soft = f.run(&["check", "--geweke", "soft.pcad"]);
+    assert!(soft.code == 1 && soft.err.contains("@soft is a factor, which has no sampler"), "{}", soft.err);
+    assert_eq!(f.files(), ["soft.pcad", "stuck.pcad"]);
+}
+
+/// What would be observed again: the table, the file, and the same whatever the number of threads.
+#[test]
+fn predictive_checks() {
+    let f = Folder::new("predictive");
+    let args = ["predict", "linreg.pcad", "--steps", "300", "--seed", "2", "--out"];
+    let one = f.succeeds(&[&args[..], &["a", "--threads", "1"]].concat());
+    f.succeeds(&[&args[..], &["b", "--threads", "2"]].concat());
+    assert_eq!(f.read("a/predictive.csv"), f.read("b/predictive.csv"));
+    assert!(
+        one.out.contains("@y") && one.out.contains("tail") && one.out.contains("from the posterior"),
+        "{}",
+        one.out
+    );
+    let csv = f.read("a/predictive.csv");
+    let mut lines = csv.lines();
+    let head = lines.next().unwrap();
+    assert!(head.starts_with("chain,draw,@y.mean,@y.sd,@y.min,@y.max,@y[0],"), "{head}");
+    assert!(lines.all(|l| l.split(',').count() == head.split(',').count()));
+    let prior = f.succeeds(&["predict", "linreg.pcad", "--prior", "-n", "50", "--out", "c"]);
+    assert!(prior.out.contains("50 draws from the prior") && f.read("c/predictive.csv").lines().count() == 51);
+    f.write("soft.pcad", "assume x ~ normal(0, 1); factor(-x * x) as soft;");
+    let soft = f.run(&["predict", "soft.pcad", "--prior"]);
+    assert!(soft.code == 1 && soft.err.contains("no observation of the program has a sampler"), "{}", soft.err);
 }
 
 /// Exit code 2 is for what the command line itself gets wrong.

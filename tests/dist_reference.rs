@@ -39,7 +39,7 @@ fn made(family: &str, p: &[f64]) -> Dist {
         ("uniform_discrete", [a, b]) => Dist::UniformDiscrete(UniformDiscrete::new(*a, *b).unwrap()),
         ("binomial", [a, b]) => Dist::Binomial(Binomial::new(*a, *b).unwrap()),
         ("poisson", [a]) => Dist::Poisson(Poisson::new(*a).unwrap()),
-        ("categorical", p) => Dist::Categorical(Arc::new(Categorical::new(p).unwrap())),
+        ("categorical", p) => Dist::Categorical(Categorical::new(p).unwrap()),
         ("dirichlet", p) => Dist::Dirichlet(Arc::new(Dirichlet::new(p).unwrap())),
         other => panic!("unknown family {other:?}"),
     }

@@ -18,35 +18,8 @@ fn conjugate_normal(kernel: &str) {
 }
 
 #[test]
-fn conjugate_normal_by_mh() {
-    conjugate_normal("mh(one(@**))");
-}
-
-#[test]
-fn conjugate_normal_by_block() {
-    conjugate_normal("block(@**)");
-}
-
-#[test]
-fn conjugate_normal_by_drift() {
-    conjugate_normal("drift(@x)");
-}
-
-#[test]
-fn conjugate_normal_by_hamiltonian_kernels_and_slices() {
-    for kernel in ["hmc(@x, steps = 4)", "mala(@x)", "nuts(@x)", "slice(@x)", "slice(@x, width = 0.3)"] {
-        conjugate_normal(kernel);
-    }
-}
-
-#[test]
-fn conjugate_normal_by_elliptical() {
-    conjugate_normal("elliptical(@x)");
-}
-
-#[test]
-fn conjugate_normal_by_a_mixture_of_kernels() {
-    conjugate_normal("mix { 0.3 => mh(@x); 0.3 => drift(@x); 0.4 => elliptical(@x); }");
+fn conjugate_normal_by_every_kernel() {
+    kernels::exact::CONJUGATE.iter().for_each(|k| conjugate_normal(k));
 }
 
 /// The default plan, nothing collected by hand.
@@ -58,7 +31,7 @@ fn conjugate_normal_by_the_default_plan() {
 
 #[test]
 fn beta_binomial() {
-    for kernel in ["mh(@p)", "drift(@p)"] {
+    for kernel in kernels::exact::BETA_BINOMIAL {
         let text = format!(
             "assume p ~ beta(1, 1); observe binomial(20, p) = 14;
              infer {{ warmup 1000 {{ {kernel}; }} repeat 40000 {{ {kernel}; collect p; }} }}"
@@ -73,7 +46,7 @@ fn support_that_depends_on_another_choice() {
     let z = integrate(|p1| 1.0 - p1 / 2.0, 0.5, 1.0, 200);
     let m1 = integrate(|p1| p1 * (1.0 - p1 / 2.0), 0.5, 1.0, 200) / z;
     let m2 = integrate(|p1| p1 / 2.0 - p1 * p1 / 3.0, 0.5, 1.0, 200) / z;
-    for kernel in ["mh(one(@**))", "block(@**)", "drift(@**)", "drift(one(@**))"] {
+    for kernel in kernels::exact::DEPENDENT_SUPPORT {
         let text = format!(
             "assume p1 ~ uniform(0.5, 1); assume p2 ~ uniform(0, p1); observe flip(p2) = false;
              infer {{ warmup 2000 {{ {kernel}; }} repeat 60000 {{ {kernel}; collect p1, p2; }} }}"
@@ -90,7 +63,7 @@ fn recursion_against_enumeration() {
     let weight = |a: f64| (a + 1.0) * 0.25 * 0.5f64.powf(a) * normal_pdf(3.0, a, 0.8);
     let z: f64 = (0..60).map(|a| weight(f64::from(a))).sum();
     let expected = (0..60).map(|a| f64::from(a) * weight(f64::from(a))).sum::<f64>() / z;
-    for kernel in ["mh(one(@**))", "gibbs(one(@**))", "block(@**)", "drift(one(@**))", "mh(one(@a/geom#2))"] {
+    for kernel in kernels::exact::RECURSION.iter().copied() {
         let kernel =
             if kernel.contains('#') { "mix { 0.5 => mh(one(@a/geom#2)); 0.5 => mh(one(@a/geom)); }" } else { kernel };
         let k = if kernel.starts_with("mix") { kernel.to_owned() } else { format!("{kernel};") };
@@ -113,7 +86,7 @@ fn branches_with_choices_of_their_own() {
     let w2 = 0.7 * normal_pdf(3.0, 5.0, 5f64.sqrt());
     let p = w1 / (w1 + w2);
     let mean_x = p * 1.5 + (1.0 - p) * (5.0 + 4.0 / 5.0 * (3.0 - 5.0));
-    for kernel in ["mh(one(@**));", "gibbs(@c); drift(@x);", "block(@**);", "mh(@c); elliptical(one($gaussian));"] {
+    for kernel in kernels::exact::BRANCHES {
         let text = format!(
             "assume c ~ flip(0.3);
              assume x = if c {{ a ~ normal(0, 1); a }} else {{ a ~ normal(5, 2); a }};
@@ -154,7 +127,7 @@ fn hidden_markov_model() {
             (0..3).map(|s| s as f64 * forward[t][s] * backward[t][s]).sum::<f64>() / z
         })
         .collect();
-    for kernel in ["gibbs(one(@s))", "mh(one(@s))", "drift(one(@s))"] {
+    for kernel in kernels::exact::HIDDEN_MARKOV {
         let text = format!(
             "let y = [0.2, 1.1, 2.3, 1.9, 0.4];
              let trans = [[0.8, 0.15, 0.05], [0.2, 0.6, 0.2], [0.1, 0.3, 0.6]];
@@ -193,10 +166,7 @@ fn open_universe_with_mem() {
     let z = together + first_two + outer + last_two + apart;
     let p01 = (together + first_two) / z;
     let p12 = (together + last_two) / z;
-    for kernel in [
-        "mh(one($discrete)); drift(one($continuous));",
-        "gibbs(one($discrete)); mh(one($continuous)); mh(one($discrete));",
-    ] {
+    for kernel in kernels::exact::OPEN_UNIVERSE {
         let text = format!(
             "let y = [-1, -0.5, 2];
              assume stick = mem(fn(k) {{ v ~ beta(1, 1); v }});
@@ -319,4 +289,69 @@ fn a_population_settles_by_mass() {
     // Three standard errors of a share of 0.7 in 300 chains are 0.08.
     let right = x.iter().filter(|x| **x > 0.0).count() as f64 / 300.0;
     assert!((right - 0.7).abs() < 0.08, "{right}");
+}
+
+/// Two modes far apart, 0.3 N(-4, 0.5) + 0.7 N(4, 0.5): replica exchange crosses between them, the kernel inside does not.
+#[test]
+fn replica_exchange_weighs_modes_that_are_far_apart() {
+    let text = |kernel: &str| {
+        format!(
+            "assume x ~ uniform(-20, 20);
+             factor(log(0.3 * exp(-2 * (x + 4) ** 2) + 0.7 * exp(-2 * (x - 4) ** 2) + 1e-300));
+             infer {{ warmup 5000 {{ {kernel}; }} repeat 40000 {{ {kernel}; collect x < 0; }} }}"
+        )
+    };
+    let tempered = run(&text("temper(drift(@x, scale = 0.5), levels = 6)"), 1, 2);
+    assert_mean("share of the lower mode", &tempered["x < 0"], 0.3, 0.05);
+    let plain = run(&text("drift(@x, scale = 0.2)"), 1, 2);
+    assert!((mean(&plain["x < 0"]) - 0.3).abs() > 0.1, "a plain chain stays where it is");
+}
+
+/// A kernel of the program: an asymmetric proposal whose way back is found by replay.
+#[test]
+fn proposals_of_the_program_are_paid_for() {
+    let d = run(
+        "assume x ~ normal(0, 1); observe normal(x, 0.5) = 2;
+         kernel pull(s) { let here = value(@x); propose @x ~ normal(0.7 * here + 1, s); }
+         infer { warmup 1000 { pull(0.8); } repeat 60000 { pull(0.8); collect x; } }",
+        1,
+        2,
+    );
+    assert_mean("own kernel", &d["x"], 1.6, 0.06);
+    let squares: Vec<f64> = d["x"].iter().map(|x| (x - 1.6) * (x - 1.6)).collect();
+    assert_mean("own kernel, variance", &squares, 0.2, 0.03);
+}
+
+/// The same for a choice with which others appear and vanish, and for several choices at computed addresses.
+#[test]
+fn proposals_of_the_program_change_structure() {
+    let d = run(
+        "assume c ~ flip(0.4);
+         assume x = if c { z[0] ~ normal(1, 1); z[0] } else { z[0] ~ normal(-1, 1); z[1] ~ normal(0, 1); z[0] + z[1] };
+         observe normal(x, 1) = 0.5;
+         kernel turn() { propose @c ~ flip(0.5); }
+         kernel shift() { for i in 0 .. 1 { let here = value(@x/z[{i}]); propose @x/z[{i}] ~ normal(0.5 * here, 1); } }
+         infer { repeat 60000 { turn(); shift(); mh(one($continuous)); collect c; } }",
+        1,
+        2,
+    );
+    let (yes, no) = (0.4 * normal_pdf(0.5, 1.0, 2f64.sqrt()), 0.6 * normal_pdf(0.5, -1.0, 3f64.sqrt()));
+    assert_mean("c", &d["c"], yes / (yes + no), 0.03);
+}
+
+/// A climb ends where the density is highest: of a normal posterior at its mean.
+#[test]
+fn optimize_finds_the_mode() {
+    let d = run(
+        "assume a ~ normal(0, 1); assume b ~ normal(a, 0.1); observe normal(a + 3 * b, 0.5) = 2;
+         infer { repeat 1 { optimize(@**); collect a, b; } }",
+        1,
+        1,
+    );
+    // The mode of exp(-(a^2 + (b - a)^2 / 0.01 + (a + 3 b - 2)^2 / 0.25) / 2) by solving its two linear equations.
+    let (p, q, r) = (1.0 + 100.0 + 4.0, -100.0 + 12.0, 100.0 + 36.0);
+    let (u, v) = (8.0, 24.0);
+    let det = p * r - q * q;
+    assert!((d["a"][0] - (u * r - q * v) / det).abs() < 1e-5, "{}", d["a"][0]);
+    assert!((d["b"][0] - (p * v - q * u) / det).abs() < 1e-5, "{}", d["b"][0]);
 }

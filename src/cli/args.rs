@@ -24,8 +24,10 @@ pub enum Command {
     Sample(Sample),
     /// Draw scenes from the prior into a bank, from which the kernel `knn` proposes
     Learn(Learn),
-    /// Check programs without running them
+    /// Check programs: without running them, or whether their plans draw from the posterior
     Check(Check),
+    /// Draw what would be observed again, and compare with what is
+    Predict(Predict),
     /// Find the contours of a photograph
     Contours(Contours),
     /// Explain a built-in, or list all of them
@@ -221,10 +223,58 @@ pub enum FeatureKind {
 
 /// `check`.
 #[derive(Args, Debug)]
+#[command(after_help = CHECKS)]
 pub struct Check {
     /// The programs
     #[arg(required = true, value_name = "PROG")]
     pub programs: Vec<String>,
+    /// Run the plan on data simulated from the program and rank the true values among the draws
+    #[arg(long)]
+    pub sbc: bool,
+    /// Let the plan and fresh data take turns and compare with the prior
+    #[arg(long)]
+    pub geweke: bool,
+    /// Data sets of --sbc (200 if left out), chains of --geweke (100)
+    #[arg(long, value_parser = clap::value_parser!(u32).range(20..=1_000_000))]
+    pub replicates: Option<u32>,
+    /// The seed: same seed, same result
+    #[arg(long, default_value_t = 1)]
+    pub seed: u64,
+    /// The number of threads; as many as the machine has, if left out
+    #[arg(long, value_parser = clap::value_parser!(u32).range(1..=1024))]
+    pub threads: Option<u32>,
+    /// Kernel applications per chain after warm-up, in place of what the program says
+    #[arg(long)]
+    pub steps: Option<u64>,
+    /// Set a `param`, its value as in a program; may be repeated
+    #[arg(long = "set", value_name = "NAME=VALUE", value_parser = pair)]
+    pub sets: Vec<(String, String)>,
+    /// A file for a `data` item: simulated data take its form
+    #[arg(long, value_name = "[NAME=]FILE")]
+    pub observe: Vec<String>,
+}
+
+/// What the two checks are.
+const CHECKS: &str = "\
+With --sbc or --geweke data are simulated from the program itself, so every observation needs a sampler: distributions have
+one, and scene.mask, scene.depth, scene.keypoints and scene.region (one power of 1, the other 0). Exit code 1 if a quantity
+fails, or if the program cannot be simulated. A right plan fails by chance once in 1000.";
+
+/// `predict`.
+#[derive(Args, Debug)]
+pub struct Predict {
+    /// What is run
+    #[command(flatten)]
+    pub job: Job,
+    /// Draw from the prior in place of the posterior
+    #[arg(long)]
+    pub prior: bool,
+    /// Draws from the prior
+    #[arg(short, default_value_t = 1000, requires = "prior", value_parser = clap::value_parser!(u32).range(1..=1_000_000))]
+    pub n: u32,
+    /// The folder for results; runs/PROG-predictive if left out
+    #[arg(long, value_name = "DIR")]
+    pub out: Option<PathBuf>,
 }
 
 /// `contours`.

@@ -7,10 +7,12 @@ use super::best::best_draw;
 use super::keypoints::Joints;
 use super::{Failure, given, plain, progress};
 use pcadlang::bank::BankFiles;
-use pcadlang::infer::draws::{KernelStats, Sink};
+use pcadlang::infer::draws::{KernelStats, Sink, SiteStats};
 use pcadlang::infer::{ChainResult, Progress};
 use pcadlang::report::html::{MeshData, Page, page};
-use pcadlang::report::{ChainDraws, Memory, Quantity, RunDir, Tee, csv::CsvSink, quantities, seconds, table};
+use pcadlang::report::{
+    ChainDraws, Memory, Mode, Quantity, RunDir, Tee, csv::CsvSink, modes, quantities, seconds, table,
+};
 use pcadlang::vision::Photo;
 use pcadlang::{Model, RunOptions};
 use serde_json::{Map, Value, json};
@@ -33,6 +35,10 @@ pub struct Outcome {
     pub quantities: Vec<Quantity>,
     /// What the kernels did, over all chains.
     pub kernels: Vec<KernelStats>,
+    /// What single-site kernels did, by address, over all chains.
+    pub sites: Vec<SiteStats>,
+    /// The places that chains stay at, where there are several.
+    pub modes: Vec<Mode>,
     /// What has not converged, and the like.
     pub warnings: Vec<String>,
     /// The chains.
@@ -41,6 +47,27 @@ pub struct Outcome {
     pub seconds: f64,
     /// Whether the user ended it.
     pub interrupted: bool,
+}
+
+impl Outcome {
+    /// The time of all kernels after warm-up, over all chains, in seconds.
+    pub fn kernel_seconds(&self) -> f64 {
+        kernel_seconds(&self.kernels)
+    }
+}
+
+fn kernel_seconds(kernels: &[KernelStats]) -> f64 {
+    kernels.iter().map(|k| k.seconds).sum()
+}
+
+/// The summary of each quantity, with its effective draws in a second of the kernels' time.
+pub fn summaries(quantities: &[Quantity], seconds: f64) -> Map<String, Value> {
+    let one = |q: &Quantity| {
+        let mut s = json!(q.summary);
+        s["ess_per_second"] = json!(table::per_second(q.summary.ess_bulk, seconds));
+        (q.name.clone(), s)
+    };
+    quantities.iter().map(one).collect()
 }
 
 /// Reads and compiles; the time of a run begins here.
@@ -76,7 +103,7 @@ impl Interrupt {
     }
 
     /// Ends this run at its next step when asked, or at once if that was before.
-    fn ends(&self, run: &Arc<Progress>) {
+    pub fn ends(&self, run: &Arc<Progress>) {
         *self.run.lock().unwrap_or_else(PoisonError::into_inner) = Arc::downgrade(run);
         if self.asked() {
             self.pass_on();
@@ -93,6 +120,11 @@ impl Interrupt {
 /// The folder a program is in.
 fn folder(program: &str) -> &Path {
     Path::new(program).parent().unwrap_or(Path::new(""))
+}
+
+/// The name of a program without folder and ending.
+pub fn stem(path: &str) -> &str {
+    Path::new(path).file_stem().and_then(|s| s.to_str()).unwrap_or("run")
 }
 
 /// The number of threads of a run.
@@ -188,6 +220,7 @@ fn fill(
         incremental: !s.no_incremental,
         watch: Some(Arc::new(joints.clone())),
         banks: Some(Arc::new(BankFiles::new(model, folder(&job.given.program), job.features_from.clone()))),
+        sites: true,
         ..RunOptions::default()
     };
     let memories: Vec<Memory> = (0..s.chains).map(|_| Memory::default()).collect();
@@ -208,7 +241,13 @@ fn fill(
     let quantities = quantities(&draws);
     let kernels = table::merged(chains.iter().map(|c| &c.kernels[..]));
     let warnings = table::warnings(&quantities, &kernels, chains.len());
-    write_summary(dir, &quantities, &kernels, &warnings)?;
+    let modes = modes(&quantities);
+    let sites = SiteStats::total(chains.iter().flat_map(|c| &c.sites));
+    let summary = json!({
+        "quantities": summaries(&quantities, kernel_seconds(&kernels)), "kernels": kernels, "choices": sites,
+        "modes": modes, "warnings": warnings,
+    });
+    write(dir, "summary.json", &serde_json::to_vec_pretty(&summary).unwrap_or_default())?;
     let drawn = best_draw(dir, s.seed, model, &chains, photo.as_ref())?;
     let elapsed = begun.elapsed().as_secs_f64();
     if let Some(found) = drawn.view.as_ref().and_then(|v| joints.report(v, elapsed)) {
@@ -228,7 +267,7 @@ fn fill(
     let mut more = counts(&chains, &quantities);
     more.extend([("sampling_seconds".into(), json!(sampled)), ("seconds".into(), json!(elapsed))]);
     write_record(dir, record, if interrupted { "interrupted" } else { "done" }, Value::Object(more))?;
-    Ok(Outcome { quantities, kernels, warnings, chains, seconds: elapsed, interrupted })
+    Ok(Outcome { quantities, kernels, sites, modes, warnings, chains, seconds: elapsed, interrupted })
 }
 
 /// What `run.json` says of the chains at the end.
@@ -275,15 +314,4 @@ fn settings(job: &Job, model: &Model, elapsed: f64) -> Vec<(&'static str, String
     all.extend(job.given.sets.iter().map(|(k, v)| ("set", format!("{k} = {v}"))));
     all.extend(observed(job).map(|o| ("observe", o)));
     all
-}
-
-fn write_summary(
-    dir: &RunDir,
-    quantities: &[Quantity],
-    kernels: &[KernelStats],
-    warnings: &[String],
-) -> Result<(), Failure> {
-    let all: Map<_, _> = quantities.iter().map(|q| (q.name.clone(), json!(q.summary))).collect();
-    let summary = json!({ "quantities": all, "kernels": kernels, "warnings": warnings });
-    write(dir, "summary.json", &serde_json::to_vec_pretty(&summary).unwrap_or_default())
 }

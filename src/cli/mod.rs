@@ -2,6 +2,7 @@
 
 pub mod args;
 mod best;
+mod calibrate;
 mod check;
 mod contours;
 mod doc;
@@ -11,6 +12,7 @@ mod given;
 mod job;
 mod keypoints;
 mod learn;
+mod predict;
 mod progress;
 mod run;
 mod sample;
@@ -62,7 +64,9 @@ pub fn main(cli: Cli) -> ExitCode {
         Command::Evaluate(a) => evaluate::evaluate(&a),
         Command::Sample(a) => sample::sample(&a),
         Command::Learn(a) => learn::learn(&a),
+        Command::Check(a) if a.sbc || a.geweke => calibrate::calibrate(&a),
         Command::Check(a) => check::check(&a),
+        Command::Predict(a) => predict::predict(&a),
         Command::Contours(a) => contours::contours(&a),
         Command::Doc(a) => doc::doc(&a),
     };

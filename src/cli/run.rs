@@ -3,7 +3,7 @@
 use super::args::Run;
 use super::job::{self, Interrupt, Outcome};
 use super::{Failure, plain};
-use pcadlang::report::{RunDir, seconds, table};
+use pcadlang::report::{RunDir, modes_table, seconds, table};
 use serde_json::json;
 use std::path::Path;
 
@@ -16,7 +16,7 @@ pub fn run(a: &Run) -> Result<(), Failure> {
     }
     let dir = match &a.out {
         Some(path) => RunDir::create(path),
-        None => RunDir::fresh(Path::new("runs"), stem(&a.job.given.program)),
+        None => RunDir::fresh(Path::new("runs"), job::stem(&a.job.given.program)),
     };
     let dir = dir.map_err(|e| plain(e.to_string()))?;
     let interrupt = Interrupt::listen();
@@ -26,26 +26,32 @@ pub fn run(a: &Run) -> Result<(), Failure> {
     if outcome.interrupted { Err(Failure::Interrupted) } else { Ok(()) }
 }
 
-/// The name of a program without folder and ending.
-fn stem(path: &str) -> &str {
-    Path::new(path).file_stem().and_then(|s| s.to_str()).unwrap_or("run")
-}
-
 /// The end of a run on the terminal.
 fn show(a: &Run, dir: &RunDir, o: &Outcome) {
     let seed = a.job.sampling.seed;
     if a.json {
-        let all: serde_json::Map<_, _> = o.quantities.iter().map(|q| (q.name.clone(), json!(q.summary))).collect();
+        let all = job::summaries(&o.quantities, o.kernel_seconds());
         println!(
             "{}",
-            json!({ "out": dir.path(), "seed": seed, "quantities": all, "kernels": o.kernels, "warnings": o.warnings })
+            json!({
+                "out": dir.path(), "seed": seed, "quantities": all, "kernels": o.kernels, "choices": o.sites,
+                "modes": o.modes,
+                "warnings": o.warnings,
+            })
         );
         return;
     }
     if a.quiet {
         return;
     }
-    print!("{}\n{}", table::quantities(&o.quantities), table::kernels(&o.kernels));
+    let modes = modes_table(&o.modes, &o.quantities);
+    let gap = if modes.is_empty() { "" } else { "\n" };
+    let quantities = table::quantities(&o.quantities, o.kernel_seconds());
+    print!("{quantities}{gap}{modes}\n{}", table::kernels(&o.kernels));
+    let sites = table::sites(&o.sites);
+    if !sites.is_empty() {
+        print!("\n{sites}");
+    }
     for w in &o.warnings {
         println!("warning: {w}");
     }

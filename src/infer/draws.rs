@@ -96,6 +96,24 @@ pub trait Sink: Send {
     fn chain_done(&mut self, chain: u32, steps: u64, warmup: u64, seconds: f64) -> io::Result<()>;
 }
 
+/// Takes draws and forgets them: for chains that a watch looks at.
+#[derive(Clone, Copy, Debug, Default)]
+pub struct Discard;
+
+impl Sink for Discard {
+    fn columns(&mut self, _: &[Column]) -> io::Result<()> {
+        Ok(())
+    }
+
+    fn draw(&mut self, _: &DrawRow) -> io::Result<()> {
+        Ok(())
+    }
+
+    fn chain_done(&mut self, _: u32, _: u64, _: u64, _: f64) -> io::Result<()> {
+        Ok(())
+    }
+}
+
 /// What a kernel did in a chain, or in all of them.
 #[derive(Clone, Debug, Default, PartialEq, Serialize, Deserialize)]
 pub struct KernelStats {
@@ -112,6 +130,36 @@ pub struct KernelStats {
     /// Trajectories on which the energy was not kept (Hamiltonian kernels).
     #[serde(default)]
     pub divergent: u64,
+}
+
+/// What single-site kernels did to one choice in a chain, or in all of them.
+#[derive(Clone, Debug, Default, PartialEq, Serialize, Deserialize)]
+pub struct SiteStats {
+    /// Its address.
+    pub address: String,
+    /// Proposals made.
+    pub proposals: u64,
+    /// Those accepted.
+    pub accepted: u64,
+}
+
+impl SiteStats {
+    /// Accepted proposals per proposal; `None` if there was none.
+    pub fn acceptance(&self) -> Option<f64> {
+        (self.proposals > 0).then(|| self.accepted as f64 / self.proposals as f64)
+    }
+
+    /// The choices of several chains, added up by address, in order of first appearance.
+    pub fn total<'a>(stats: impl IntoIterator<Item = &'a SiteStats>) -> Vec<SiteStats> {
+        let mut sum: indexmap::IndexMap<&str, SiteStats> = indexmap::IndexMap::new();
+        for s in stats {
+            let new = || SiteStats { address: s.address.clone(), ..Default::default() };
+            let t = sum.entry(&s.address).or_insert_with(new);
+            t.proposals += s.proposals;
+            t.accepted += s.accepted;
+        }
+        sum.into_values().collect()
+    }
 }
 
 impl KernelStats {

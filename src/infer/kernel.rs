@@ -65,6 +65,8 @@ pub struct Outcome {
     pub failed: u32,
     /// Trajectories on which the energy was not kept.
     pub divergent: u32,
+    /// The choice all of it was about, of a kernel that takes one at a time.
+    pub site: Option<Target>,
 }
 
 impl Outcome {
@@ -79,6 +81,12 @@ impl Outcome {
         self.accepted += other.accepted;
         self.failed += other.failed;
         self.divergent += other.divergent;
+    }
+
+    /// The same, about one choice.
+    #[must_use]
+    pub fn at(self, target: Target) -> Self {
+        Outcome { site: Some(target), ..self }
     }
 
     /// One proposal that led to a domain error.

@@ -1,6 +1,7 @@
 //! Inference: kernels, plans, chains, diagnostics. Knows traces; knows nothing of pictures.
 
 mod build;
+pub mod calibration;
 mod chains;
 mod default_plan;
 pub mod diagnostics;
@@ -13,8 +14,10 @@ mod kernels;
 mod neighbours;
 mod plan;
 mod population;
+pub mod predictive;
 mod record;
 mod selection;
+mod sites;
 
 pub use chains::run_chains;
 pub use default_plan::default_plan;

@@ -33,7 +33,7 @@ pub enum Operand {
 }
 
 /// A whole lowered program.
-#[derive(Debug, Default)]
+#[derive(Clone, Debug, Default)]
 pub struct Code {
     /// The blocks; block 0 is the top level.
     pub blocks: Vec<Block>,
@@ -65,7 +65,12 @@ pub struct Code {
     pub kernels: Vec<crate::syntax::ast::KernelDecl>,
     /// Expressions of inference blocks, reports and exports that only read the model, by their place.
     pub queries: rustc_hash::FxHashMap<Span, Operand>,
+    /// Values observed in place of what the program says, by the hash of the observation's address.
+    pub observed: Arc<Observed>,
 }
+
+/// Observed values by the hash of the observation's address.
+pub type Observed = rustc_hash::FxHashMap<u64, Value>;
 
 /// `force @a = v;`
 #[derive(Clone, Debug)]
@@ -482,6 +487,12 @@ impl Block {
 const SHARED_CONSTANTS: usize = 256;
 
 impl Code {
+    /// The same program with other observed values.
+    #[must_use]
+    pub fn with_observed(&self, observed: Arc<Observed>) -> Code {
+        Code { observed, ..self.clone() }
+    }
+
     /// The index of a constant, added if new. Numbers, bools and strings are shared.
     pub fn constant(&mut self, v: Value) -> Operand {
         let shareable = matches!(v, Value::Num(_) | Value::Bool(_) | Value::Str(_) | Value::Unit | Value::Builtin(_));

@@ -5,6 +5,7 @@
 
 use super::adjoint::Adjoint;
 use crate::dist::{Datum, Dist};
+use crate::rng::Stream;
 use indexmap::IndexMap;
 use std::any::Any;
 use std::fmt;
@@ -88,6 +89,10 @@ pub trait Object: Any + fmt::Debug + Send + Sync {
     fn summary(&self) -> Option<String> {
         None
     }
+    /// Its contents as numbers, in an order and number that depend on its form alone; NaN where something is missing.
+    fn numbers(&self) -> Option<Vec<f64>> {
+        None
+    }
 }
 
 /// Where a named point of the scene is in the observed picture.
@@ -101,7 +106,7 @@ pub struct Located {
     pub variance: f64,
 }
 
-/// A log-density of an observed value given the scene: it scores, it has no sampler.
+/// A log-density of an observed value given the scene: it scores; some can draw observations, none can be drawn with `~`.
 ///
 /// What can be prepared from the observed value alone (a distance transform) is prepared once, by the implementation,
 /// and kept with the value.
@@ -116,6 +121,14 @@ pub trait Likelihood: fmt::Debug + Send + Sync {
     /// The derivatives of the log density by what the likelihood was made from, in a form that the derivative of the built-in
     /// that makes it understands; `None` where they are not known.
     fn gradient(&self, _observed: &Value) -> Option<Adjoint> {
+        None
+    }
+    /// Draws an observation given the scene: in the form of the observed one, with the same parts missing. `None` where it has
+    /// no sampler.
+    ///
+    /// # Errors
+    /// As [`Likelihood::log_density`], inside.
+    fn sample(&self, _observed: &Value, _rng: &mut Stream) -> Option<Result<Value, String>> {
         None
     }
     /// Named points of the scene as the observation puts them, where that says more than the scene alone.
@@ -189,6 +202,20 @@ impl Value {
             Value::Dist(_) => "a distribution",
             Value::Likelihood(_) => "a likelihood",
             Value::Object(o) => o.type_name(),
+        }
+    }
+
+    /// The numbers in it, one after the other: bools as 0 and 1, arrays and records element by element, what objects say of
+    /// themselves; nothing for anything else.
+    pub fn numbers(&self) -> Vec<f64> {
+        match self {
+            Value::Num(x) => vec![*x],
+            Value::Bool(b) => vec![f64::from(u8::from(*b))],
+            Value::Array(xs) => xs.to_vec(),
+            Value::List(xs) => xs.iter().flat_map(Value::numbers).collect(),
+            Value::Record(r) => r.values().flat_map(Value::numbers).collect(),
+            Value::Object(o) => o.numbers().unwrap_or_default(),
+            _ => Vec::new(),
         }
     }
 

@@ -122,7 +122,7 @@ pub fn markdown(rows: &[Row]) -> String {
             fixed(r.seconds, 1),
             fixed(r.wall_seconds, 1),
             fixed(r.best_log_joint, 1),
-            fixed(r.r_hat_max, 2),
+            r.r_hat_max.map_or_else(|| fixed(None, 2), |x| if x > 100.0 { ">100".into() } else { fixed(Some(x), 2) }),
             count(r.draws),
             count(r.steps),
         ]);

@@ -8,6 +8,7 @@ mod draws;
 pub mod evaluation;
 mod hash;
 pub mod html;
+mod modes;
 mod moments;
 pub mod npy;
 mod number;
@@ -20,6 +21,7 @@ mod whole;
 
 pub use draws::{ChainDraws, Quantity, quantities};
 pub use hash::{bytes_hash, text_hash};
+pub use modes::{DISAGREE, Mode, modes, modes_table, r_hat_text};
 pub use moments::{Moments, Point};
 pub use number::{number, seconds};
 pub use rundir::{RunDir, RunDirError};

@@ -1,7 +1,7 @@
 //! The tables at the end of a run: aligned text, at most [`COLUMNS`] wide.
 
 use super::{Quantity, number};
-use crate::infer::draws::KernelStats;
+use crate::infer::draws::{KernelStats, SiteStats};
 use std::fmt::Write;
 
 pub use super::warnings::warnings;
@@ -28,9 +28,9 @@ pub fn aligned(rows: &[Vec<String>]) -> String {
     s
 }
 
-/// Mean, spread, 90 % interval, effective sample size and R-hat of each quantity.
-pub fn quantities(quantities: &[Quantity]) -> String {
-    let mut rows = vec![["quantity", "mean", "sd", "5%", "95%", "ess", "r_hat"].map(str::to_owned).to_vec()];
+/// Mean, spread, 90 % interval, effective sample size (and that of a second of the kernels' time) and R-hat of each quantity.
+pub fn quantities(quantities: &[Quantity], kernel_seconds: f64) -> String {
+    let mut rows = vec![["quantity", "mean", "sd", "5%", "95%", "ess", "ess/s", "r_hat"].map(str::to_owned).to_vec()];
     let mut left_out = 0;
     let mut run = (None, 0);
     for q in quantities {
@@ -41,12 +41,43 @@ pub fn quantities(quantities: &[Quantity]) -> String {
         }
         let s = &q.summary;
         let ess = if s.ess_bulk.is_nan() { "-".into() } else { format!("{:.0}", s.ess_bulk) };
-        let r_hat = if s.r_hat.is_nan() { "-".into() } else { format!("{:.3}", s.r_hat) };
-        rows.push(vec![q.name.clone(), number(s.mean), number(s.sd), number(s.q05), number(s.q95), ess, r_hat]);
+        let r_hat = super::r_hat_text(s.r_hat);
+        let rate = per_second(s.ess_bulk, kernel_seconds).map_or("-".into(), whole);
+        rows.push(vec![q.name.clone(), number(s.mean), number(s.sd), number(s.q05), number(s.q95), ess, rate, r_hat]);
     }
     let mut text = aligned(&narrowed(rows));
     if left_out > 0 {
         let _ = writeln!(text, "… and {left_out} more elements of vectors, in summary.json");
+    }
+    text
+}
+
+/// Effective draws in a second; none where that says nothing.
+pub fn per_second(ess: f64, seconds: f64) -> Option<f64> {
+    Some(ess / seconds).filter(|r| r.is_finite() && seconds > 0.0)
+}
+
+/// At least one digit, and no more than three that count.
+fn whole(x: f64) -> String {
+    if x < 10.0 { number((x * 10.0).round() / 10.0) } else { number(x.round()) }
+}
+
+/// The choices that single-site kernels move least often, over all chains; nothing where there is only one.
+pub fn sites(sites: &[SiteStats]) -> String {
+    if sites.len() < 2 {
+        return String::new();
+    }
+    let mut worst: Vec<&SiteStats> = sites.iter().collect();
+    let rate = |s: &SiteStats| s.acceptance().unwrap_or(f64::INFINITY);
+    worst.sort_by(|a, b| rate(a).total_cmp(&rate(b)));
+    let mut rows = vec![["one at a time, least moved first", "proposals", "accepted"].map(str::to_owned).to_vec()];
+    for s in worst.iter().take(SHOWN) {
+        let rate = s.acceptance().map_or("-".into(), |r| format!("{:.0}%", 100.0 * r));
+        rows.push(vec![s.address.clone(), s.proposals.to_string(), rate]);
+    }
+    let mut text = aligned(&narrowed(rows));
+    if sites.len() > SHOWN {
+        let _ = writeln!(text, "… and {} more choices, in summary.json", sites.len() - SHOWN);
     }
     text
 }
@@ -66,7 +97,7 @@ pub fn kernels(kernels: &[KernelStats]) -> String {
 }
 
 /// Names (the first column) are cut in their middle until the lines fit, for their ends tell them apart.
-fn narrowed(mut rows: Vec<Vec<String>>) -> Vec<Vec<String>> {
+pub(super) fn narrowed(mut rows: Vec<Vec<String>>) -> Vec<Vec<String>> {
     let width = |rows: &[Vec<String>], c: usize| rows.iter().filter_map(|r| r.get(c)).map(|s| s.chars().count()).max();
     let others: usize = (1..rows.first().map_or(0, Vec::len)).filter_map(|c| width(&rows, c)).map(|w| w + 2).sum();
     let room = COLUMNS.saturating_sub(others).max(16);
@@ -106,6 +137,20 @@ drift(one(@**))          0         -       1  0.50 s
     }
 
     #[test]
+    fn rates_and_the_least_moved_choices() {
+        assert_eq!(
+            (per_second(100.0, 0.5), per_second(f64::NAN, 1.0), per_second(9.0, 0.0)),
+            (Some(200.0), None, None)
+        );
+        assert_eq!([0.04, 3.26, 123.4].map(whole), ["0", "3.3", "123"]);
+        let site = |address: &str, accepted| SiteStats { address: address.into(), proposals: 100, accepted };
+        assert_eq!(sites(&[site("@x", 5)]), "");
+        let text = sites(&[site("@x", 50), site("@y", 5)]);
+        let rows: Vec<&str> = text.lines().skip(1).map(|l| l.split_whitespace().next().unwrap()).collect();
+        assert_eq!(rows, ["@y", "@x"]);
+    }
+
+    #[test]
     fn long_names_are_cut_and_lines_fit() {
         let chains = vec![vec![-1.234_567e-7, 1.0e9, 3.0, 4.0]; 2];
         let of = |name: String| Quantity {
@@ -115,7 +160,7 @@ drift(one(@**))          0         -       1  0.50 s
             chains: chains.clone(),
         };
         let long = format!("{}/last[3]", "deep/".repeat(40));
-        let text = quantities(&[of(long), of("é".repeat(200))]);
+        let text = quantities(&[of(long), of("é".repeat(200))], 0.5);
         assert!(text.lines().all(|l| l.chars().count() <= COLUMNS), "{text}");
         assert!(
             text.lines()
@@ -123,6 +168,6 @@ drift(one(@**))          0         -       1  0.50 s
                 .is_some_and(|l| l.starts_with("deep/deep/") && l.contains("…") && l.contains("/last[3] "))
         );
         let many: Vec<Quantity> = (0..9).map(|i| of(format!("v[{i}]"))).collect();
-        assert!(quantities(&many).ends_with("… and 3 more elements of vectors, in summary.json\n"));
+        assert!(quantities(&many, 0.0).ends_with("… and 3 more elements of vectors, in summary.json\n"));
     }
 }

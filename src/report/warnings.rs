@@ -4,6 +4,7 @@
 //! draws a chain.
 
 use super::Quantity;
+use super::modes::{self, DISAGREE};
 use crate::infer::draws::KernelStats;
 
 /// Proposals before a kernel is judged.
@@ -22,11 +23,11 @@ pub fn warnings(quantities: &[Quantity], kernels: &[KernelStats], chains: usize)
         ));
     }
     if let Some((r, name)) = worst(quantities, |q| q.summary.r_hat).filter(|(r, _)| *r > 1.01) {
-        let what = if r > 1.1 { "the chains disagree" } else { "the chains may not have mixed" };
-        out.push(format!(
-            "{what}: R-hat of {name} is {r:.2} (1.01 or less is wanted); run longer with --time or --steps"
-        ));
+        let what = if r > DISAGREE { "the chains disagree" } else { "the chains may not have mixed" };
+        let r = if r > 100.0 { "above 100".to_owned() } else { format!("{r:.2}") };
+        out.push(format!("{what}: R-hat of {name} is {r} (1.01 or less is wanted); run longer with --time or --steps"));
     }
+    out.extend(modes::warning(&modes::modes(quantities)));
     let wanted = 100 * chains;
     if let Some((e, name)) = worst(quantities, |q| -q.summary.ess_bulk).filter(|(e, _)| -e < wanted as f64) {
         let e = -e;
@@ -105,7 +106,8 @@ mod tests {
         let apart = |by: f64| (0..2).map(|c| noise(c + 13, 500).iter().map(|x| x + by * c as f64).collect()).collect();
         let w = warnings(&[quantity("near", apart(0.2)), quantity("far", apart(5.0))], &[], 2);
         assert!(w[0].starts_with("the chains disagree: R-hat of far is"), "{w:?}");
-        assert!(w[1].starts_with("few independent draws: ") && w[1].contains("of far (200 are wanted)"), "{w:?}");
+        assert!(w[1].starts_with("each of the 2 chains stays at a place of its own"), "{w:?}");
+        assert!(w[2].starts_with("few independent draws: ") && w[2].contains("of far (200 are wanted)"), "{w:?}");
     }
 
     #[test]

@@ -84,6 +84,8 @@ pub(crate) struct Graph {
     pub starting: bool,
     /// Values that choices take when they are first drawn.
     pub constraints: FxHashMap<u64, Constraint>,
+    /// Values observed in place of the program's, by the hash of the observation's address.
+    pub observed: std::sync::Arc<FxHashMap<u64, Value>>,
     /// During a query: the sums before it, for probes.
     pub before: Option<Before>,
     /// False: every update re-runs everything.
@@ -127,6 +129,7 @@ impl Graph {
             draws: Draws::default(),
             starting: false,
             constraints: FxHashMap::default(),
+            observed: std::sync::Arc::clone(&code.observed),
             before: None,
             incremental: true,
             limits,

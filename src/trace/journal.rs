@@ -53,6 +53,8 @@ pub(crate) enum Entry {
     },
     /// An address index entry was overwritten.
     AddressShadowed(u64, NodeId),
+    /// Another value was put in place of an observed one.
+    Observed(u64, Option<Value>),
 }
 
 /// The sums before an update.
@@ -179,6 +181,7 @@ impl Graph {
                 Entry::ChoiceRemoved(n, hash) => self.choices.undo_remove(n, hash),
                 Entry::TargetsReplaced { selection, before } => self.choices.undo_targets(selection, before),
                 Entry::AddressShadowed(hash, n) => self.choices.undo_shadow(hash, n),
+                Entry::Observed(hash, old) => self.undo_observed(hash, old),
             }
         }
         self.prior = before.prior;

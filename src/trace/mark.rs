@@ -10,7 +10,7 @@ use crate::lang::code::{Callee, Code, DistSpec, Op, Operand};
 use crate::lang::value::Value;
 
 impl Graph {
-    /// Marks a choice that is about to change, and everything that reads it.
+    /// Marks a choice or observation that is about to change, and everything that reads it.
     pub fn mark_target(&mut self, code: &Code, n: NodeId) {
         self.make_stale(code, n);
         self.mark_users(code, n);

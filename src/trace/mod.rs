@@ -12,6 +12,7 @@ mod graph;
 mod journal;
 mod mark;
 mod node;
+mod observed;
 mod path;
 mod peek;
 mod propose;
@@ -22,6 +23,7 @@ mod spread;
 pub use crate::lang::address::{Address, AddressSegment};
 pub use choices::{Selection, Target};
 pub use graph::Limits;
+pub use observed::{Observation, Replicate};
 pub use propose::{Change, Constraint, Draws, Weight};
 pub use save::{SaveError, SavedTrace};
 pub use select::{ChoiceKind, Pattern, PatternSegment, Selector};
@@ -347,6 +349,12 @@ impl Trace {
         if t.element == NONE { h } else { eval::choice::element_hash(h, t.element as usize) }
     }
 
+    /// Whether a target that was listed before is still a choice of this trace.
+    pub fn is_active(&self, t: Target) -> bool {
+        let node = self.graph.nodes.get(t.node as usize);
+        node.is_some_and(|n| n.state == State::Clean) && matches!(self.graph.op(&self.code, t.node), Op::Draw { .. })
+    }
+
     /// The value of a choice as the program sees it.
     pub fn value(&self, t: Target) -> Value {
         let v = &self.graph.nodes[t.node as usize].value;
@@ -515,7 +523,7 @@ impl Trace {
             let Op::Observe { dist: DistSpec::Value(o), value, .. } = self.graph.op(&self.code, n) else { return None };
             let frame = self.graph.nodes[n as usize].frame;
             let Value::Likelihood(l) = self.graph.value(&self.code, frame, *o) else { return None };
-            Some((&**l, self.graph.plain(&self.code, frame, *value, &mut node::Deps::new())))
+            Some((&**l, self.graph.observed_value(&self.code, n, *value, &mut node::Deps::new())))
         })
     }
 
@@ -549,7 +557,11 @@ impl Trace {
     /// What the program does wrong.
     pub fn rerun(&self) -> TraceResult<Trace> {
         let saved = self.constraints();
-        Trace::generate(Arc::clone(&self.code), saved, Draws::default(), self.graph.limits).map(|(t, _)| t)
+        let code = match Arc::ptr_eq(&self.graph.observed, &self.code.observed) {
+            true => Arc::clone(&self.code),
+            false => Arc::new(self.code.with_observed(Arc::clone(&self.graph.observed))),
+        };
+        Trace::generate(code, saved, Draws::default(), self.graph.limits).map(|(t, _)| t)
     }
 
     /// The choices as constraints for [`Trace::generate`].

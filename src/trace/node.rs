@@ -35,7 +35,7 @@ pub(crate) enum State {
 
 /// The node's operands are held by it.
 pub(crate) const HELD: u8 = 1;
-/// The node is a choice with a pending change.
+/// The node is a choice with a pending change, or an observation with another value.
 pub(crate) const TARGET: u8 = 2;
 /// The node's state before it began to run was [`State::Stale`].
 pub(crate) const WAS_STALE: u8 = 4;

@@ -134,7 +134,10 @@ impl Graph {
                 }
                 Op::Observe { dist: spec, value: observed, .. } => {
                     let values = self.peek_all(code, peek, &value, node.frame, spec.operands())?;
-                    let observed = self.peek_operand(code, peek, &value, node.frame, *observed)?;
+                    let observed = match self.replaced(code, n) {
+                        Some(v) => v.clone(),
+                        None => self.peek_operand(code, peek, &value, node.frame, *observed)?,
+                    };
                     let score = self.score_of_values(code, n, spec, &refs(&values), &observed)?;
                     self.take_score(n, &mut likelihood);
                     match score {

@@ -1,6 +1,8 @@
 //! Running programs given as text, and judging their draws.
 #![allow(dead_code)]
 
+pub mod kernels;
+
 use pcadlang::Model;
 use pcadlang::infer::RunOptions;
 use std::collections::BTreeMap;

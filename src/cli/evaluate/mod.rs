@@ -13,7 +13,7 @@ use super::{Failure, given, job, plain, term};
 use dataset::{Case, Dataset, Layout};
 use observed::{Detections, Items, observations_for};
 use pcadlang::report::evaluation::{EvaluationDir, MARK, PREDICTIONS, Row, TABLE, markdown, prediction};
-use pcadlang::report::{RunDir, bytes_hash, number, seconds};
+use pcadlang::report::{RunDir, bytes_hash, r_hat_text, seconds};
 use serde_json::{Map, Value, json};
 use std::sync::Arc;
 use std::time::Instant;
@@ -91,7 +91,7 @@ fn line(row: &Row) -> String {
         s.push_str(&format!(", best log joint {best:.1}"));
     }
     if let Some(r) = row.r_hat_max {
-        s.push_str(&format!(", R-hat {}", number((r * 1000.0).round() / 1000.0)));
+        s.push_str(&format!(", R-hat {}", r_hat_text(r)));
     }
     s + &row.draws.map_or(String::new(), |n| format!(", {n} draws"))
 }

@@ -13,6 +13,7 @@ mod autocovariance;
 mod chains;
 mod ess;
 mod mcse;
+mod modes;
 mod normal_scores;
 mod quantile;
 mod rhat;
@@ -20,6 +21,7 @@ mod summary;
 
 pub use ess::{ess_bulk, ess_mean, ess_quantile, ess_tail};
 pub use mcse::{mcse_mean, mcse_sd};
+pub use modes::modes;
 pub use quantile::{quantile, quantile_sorted};
 pub use rhat::r_hat;
 pub use summary::{Summary, summary};

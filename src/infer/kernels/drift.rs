@@ -217,7 +217,7 @@ impl Kernel for Drift {
             return Ok(Outcome::default());
         }
         let proposed = trace.propose(&changes, at.draws(0));
-        let outcome = match recoverable(proposed)? {
+        let mut outcome = match recoverable(proposed)? {
             None => Outcome::failed(),
             Some(w) => {
                 let mut ratio = at.tempered(&w) + w.log_jacobian + ways - self.scope.ways_back(trace);
@@ -228,6 +228,7 @@ impl Kernel for Drift {
                 decide(trace, ratio, &mut rng)
             }
         };
+        outcome.site = (!joint).then_some(targets[0]);
         if at.adapting && self.adaptive {
             self.adapt(key, outcome.accepted > 0, dimensions);
             if joint {

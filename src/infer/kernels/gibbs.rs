@@ -106,7 +106,7 @@ impl Kernel for Gibbs {
         };
         let forward = self.weigh(trace, at, target, libm::log(n as f64), old, 0)?;
         let chosen = sample_log(&self.log, &mut rng);
-        let mut outcome = Outcome { proposals: 1, failed: forward.failed, ..Default::default() };
+        let mut outcome = Outcome { proposals: 1, failed: forward.failed, ..Default::default() }.at(target);
         if chosen == old {
             trace.rollback();
             return Ok(outcome);

@@ -29,8 +29,8 @@ impl Kernel for Mh {
         let mut rng = at.stream();
         let Some((target, n)) = self.scope.pick(trace, at, &mut rng) else { return Ok(Outcome::default()) };
         let proposed = trace.propose(&[(target, Change::Resample)], at.draws(0));
-        let Some(weight) = recoverable(proposed)? else { return Ok(Outcome::failed()) };
+        let Some(weight) = recoverable(proposed)? else { return Ok(Outcome::failed().at(target)) };
         let ratio = at.tempered(&weight) + libm::log(n as f64) - self.scope.ways_back(trace);
-        Ok(decide(trace, ratio, &mut rng))
+        Ok(decide(trace, ratio, &mut rng).at(target))
     }
 }

@@ -102,7 +102,8 @@ impl Kernel for Slice {
     fn step(&mut self, trace: &mut Trace, at: &At) -> TraceResult<Outcome> {
         let mut rng = at.stream();
         let (targets, _) = self.scope.members(trace, at, &mut rng);
-        let mut outcome = Outcome::default();
+        let site = if let [one] = targets[..] { Some(one) } else { None };
+        let mut outcome = Outcome { site, ..Default::default() };
         for target in targets {
             let mut coordinate = 0;
             // Read anew for each coordinate: the one before has moved.

@@ -4,7 +4,7 @@ pub(super) mod banks;
 mod warmup;
 
 use super::build::{build, is_constant};
-use super::draws::{DrawRow, KernelStats, Sink};
+use super::draws::{DrawRow, KernelStats, Sink, SiteStats};
 use super::expr::{Scope, evaluate};
 use super::init::{StartError, start_of, starts};
 use super::kernel::{At, Kernel, Outcome};
@@ -13,6 +13,7 @@ use super::neighbours::Banks;
 use super::population::Population;
 use super::record::Recorder;
 use super::selection::{fail, selector};
+use super::sites::Sites;
 use crate::lang::code::Code;
 use crate::lang::error::RunError;
 use crate::lang::value::Value;
@@ -45,6 +46,8 @@ pub struct RunOptions {
     pub watch: Option<Arc<dyn Watch>>,
     /// Who finds the neighbours that `knn` proposes from.
     pub banks: Option<Arc<dyn Banks>>,
+    /// Whether to count what single-site kernels do by address; it costs a few percent of a fast step.
+    pub sites: bool,
 }
 
 impl Default for RunOptions {
@@ -58,6 +61,7 @@ impl Default for RunOptions {
             limits: Limits::default(),
             watch: None,
             banks: None,
+            sites: false,
         }
     }
 }
@@ -65,7 +69,8 @@ impl Default for RunOptions {
 /// Looks at the state of a chain whenever a draw is recorded.
 pub trait Watch: fmt::Debug + Send + Sync {
     /// A draw of a chain has been recorded, and this is its state. What it asks for and no observation does is drawn from
-    /// `draws`; it must leave the state as it is. Draws of one chain come in order, chains in any.
+    /// `draws`. It leaves the state as it is, unless it is there to change it ([`super::calibration::geweke()`]): the chain goes on
+    /// from what it leaves. Draws of one chain come in order, chains in any.
     fn draw(&self, chain: u32, trace: &mut Trace, draws: Draws);
 }
 
@@ -95,6 +100,8 @@ pub struct ChainResult {
     pub draws: u64,
     /// What the kernels did.
     pub kernels: Vec<KernelStats>,
+    /// What single-site kernels did, by address, if that was asked for.
+    pub sites: Vec<SiteStats>,
     /// Wall time.
     pub seconds: f64,
 }
@@ -144,6 +151,7 @@ pub(crate) struct Runner<'a> {
     instances: Vec<Instance>,
     /// By the place of a call that always means the same: its kernel.
     places: FxHashMap<usize, usize>,
+    sites: Sites,
     recorder: Recorder,
     frozen: Selector,
     started: Instant,
@@ -189,6 +197,7 @@ pub(crate) fn run_chain(
         variables: Vec::new(),
         instances: Vec::new(),
         places: FxHashMap::default(),
+        sites: Sites::default(),
         recorder: Recorder::new(code, plan),
         frozen: Selector::Nothing,
         started,
@@ -216,6 +225,7 @@ pub(crate) fn run_chain(
         warmup,
         draws: runner.draws,
         kernels: runner.instances.into_iter().map(|i| i.stats).collect(),
+        sites: runner.sites.into_stats(),
         seconds,
     })
 }
@@ -487,6 +497,9 @@ impl Runner<'_> {
     fn step(&mut self, i: usize, member: usize) -> Result<Outcome, ChainError> {
         let at = At { member, ..self.at() };
         let outcome = self.instances[i].kernel.step(&mut self.trace, &at)?;
+        if self.options.sites && !self.in_warmup {
+            self.sites.count(&self.trace, &outcome);
+        }
         self.step += 1;
         self.progress.steps.fetch_add(1, Ordering::Relaxed);
         Ok(outcome)

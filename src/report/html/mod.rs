@@ -5,7 +5,7 @@
 mod encode;
 mod plots;
 
-use super::{Quantity, number, seconds};
+use super::{Quantity, number, r_hat_text, seconds};
 use crate::infer::draws::KernelStats;
 use encode::{base64, coordinates, escaped};
 use std::fmt::Write;
@@ -60,6 +60,7 @@ pub fn page(p: &Page) -> String {
     }
     pictures(&mut s, p);
     quantities(&mut s, p.quantities);
+    modes(&mut s, p.quantities);
     kernels(&mut s, p.kernels);
     draws(&mut s, p.quantities);
     s.push_str("<h2>Settings</h2>\n<table class=\"settings\">\n");
@@ -110,8 +111,29 @@ fn quantities(s: &mut String, quantities: &[Quantity]) {
             let _ = write!(s, "<td>{}", number(x));
         }
         let class = if m.r_hat > 1.01 { " class=\"bad\"" } else { "" };
-        let r_hat = if m.r_hat.is_finite() { format!("{:.3}", m.r_hat) } else { number(m.r_hat) };
+        let r_hat = escaped(&r_hat_text(m.r_hat));
         let _ = writeln!(s, "<td{class}>{r_hat}</tr>");
+    }
+    s.push_str("</table>\n");
+}
+
+/// Where the chains stay, if that is not one place.
+fn modes(s: &mut String, quantities: &[Quantity]) {
+    let found = super::modes(quantities);
+    let rows = super::modes::modes_rows(&found, quantities);
+    let Some((head, body)) = rows.split_first() else { return };
+    let _ = writeln!(s, "<h2>Places</h2>\n<p class=\"note\">The chains stay at {} different places.</p>", found.len());
+    s.push_str("<table>\n<tr>");
+    head.iter().for_each(|h| {
+        let _ = write!(s, "<th>{}", escaped(h));
+    });
+    s.push_str("</tr>\n");
+    for row in body {
+        s.push_str("<tr>");
+        row.iter().for_each(|c| {
+            let _ = write!(s, "<td>{}", escaped(c));
+        });
+        s.push_str("</tr>\n");
     }
     s.push_str("</table>\n");
 }
@@ -167,7 +189,7 @@ mod tests {
             warnings: &[text.into()],
         });
         assert!(!page.contains("alert(1)</") && !page.contains("& ") && !page.contains("alert(1)<"), "escaped");
-        assert_eq!(page.matches("&lt;script&gt;alert(1)&lt;/script&gt; &amp; &quot;s&quot;").count(), 10);
+        assert_eq!(page.matches("&lt;script&gt;alert(1)&lt;/script&gt; &amp; &quot;s&quot;").count(), 11);
         assert!(page.contains("data:image/png;base64,AQID"));
         assert!(page.contains("{\"positions\":[0,0,2,0,0,2,0,0,2],\"triangles\":[0,1,2]}"));
         assert!(page.contains("<td class=\"bad\">") && page.contains("<td>0<td>-<td>0<td>0.00 s"));

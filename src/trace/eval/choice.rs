@@ -124,7 +124,7 @@ impl Graph {
             DistSpec::Value(_) => match values[0] {
                 Value::Dist(d) => Ok(Dist::clone(d)),
                 Value::Likelihood(l) => {
-                    let message = format!("`{}` is a likelihood: it can be observed, it has no sampler", l.name());
+                    let message = format!("`{}` is a likelihood: it can be observed, not drawn", l.name());
                     Err(Fault::type_error(message))
                 }
                 v => Err(Fault::type_error(format!("`~` needs a distribution, got {}", v.type_name()))

@@ -51,6 +51,7 @@ impl Graph {
             }
         }
         self.set_deps(n, deps);
+        self.nodes[n as usize].flags &= !TARGET;
         Ok(self.finish(code, n, Value::Unit))
     }
 
@@ -76,7 +77,10 @@ impl Graph {
         deps: &mut Deps,
     ) -> Result<Result<Score, Failure>, NodeId> {
         let values = self.inputs(code, frame, spec.operands(), deps)?;
-        let observed = self.inputs(code, frame, &[value], deps)?[0];
+        let observed = match self.replaced(code, n) {
+            Some(v) => v,
+            None => self.inputs(code, frame, &[value], deps)?[0],
+        };
         Ok(self.score_of_values(code, n, spec, &values, observed))
     }
 
@@ -114,7 +118,10 @@ impl Graph {
                 self.demand(code, m)?;
             }
         }
-        let observed = self.value(code, frame, *value);
+        let observed = match self.replaced(code, n) {
+            Some(v) => v,
+            None => self.value(code, frame, *value),
+        };
         let score = match self.value(code, frame, *coarse) {
             v @ Value::Likelihood(_) => likelihood_score(v, observed),
             Value::Dist(d) => score_value(d, observed).map(|s| match s {

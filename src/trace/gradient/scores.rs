@@ -22,7 +22,9 @@ impl Reverse<'_> {
             Op::Draw { dist, .. } => self.dist_inputs(n, dist, &mut all),
             Op::Observe { dist, value, .. } => {
                 self.dist_inputs(n, dist, &mut all);
-                all.extend(self.source(frame, *value));
+                if self.graph.replaced(self.code, n).is_none() {
+                    all.extend(self.source(frame, *value));
+                }
             }
             Op::Factor { weight, .. } => all.extend(self.source(frame, *weight)),
             _ => {}
@@ -55,7 +57,7 @@ impl Reverse<'_> {
             }
             Op::Observe { dist: spec, value, .. } => {
                 let mut deps = Deps::new();
-                let observed = g.plain(code, frame, *value, &mut deps);
+                let observed = g.observed_value(code, n, *value, &mut deps);
                 if let DistSpec::Value(o) = spec
                     && let Value::Likelihood(l) = g.value(code, frame, *o)
                 {
@@ -72,7 +74,9 @@ impl Reverse<'_> {
                 };
                 scale(&mut by_x, self.power);
                 params.iter_mut().for_each(|p| *p *= self.power);
-                self.give(frame, *value, by_x);
+                if g.replaced(code, n).is_none() {
+                    self.give(frame, *value, by_x);
+                }
                 self.give_params(n, spec, &dist, params)?;
                 if let Some(x) = observed.to_datum() {
                     // What is observed is the value, however a choice would be stored.

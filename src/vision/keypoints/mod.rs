@@ -102,6 +102,13 @@ impl Keypoints {
         self.size
     }
 
+    /// The same joints at other places, in the same units: as many of `points` as there are joints.
+    #[must_use]
+    pub fn moved(&self, points: &[Keypoint]) -> Keypoints {
+        let moved = |(p, to): (&Keypoint, &Keypoint)| Keypoint { x: to.x, y: to.y, ..p.clone() };
+        Keypoints { points: self.points.iter().zip(points).map(moved).collect(), ..self.clone() }
+    }
+
     /// The same, known to be of an image of this size; what a file says of its own size goes first.
     #[must_use]
     pub fn in_image(self, width: u32, height: u32) -> Keypoints {

@@ -138,6 +138,11 @@ impl Region {
         &self.options
     }
 
+    /// The number of colours.
+    pub fn colours(&self) -> usize {
+        self.colours
+    }
+
     /// The weighted log-probability of the colours if everything is background: a constant of the picture. Added to
     /// [`Region::log_likelihood`] it gives the log-probability itself (without shading).
     pub fn log_background(&self) -> f64 {

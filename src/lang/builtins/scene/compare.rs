@@ -5,11 +5,13 @@ use super::{VIEW, ViewValue, native};
 use crate::lang::builtins::{Arg, Args, Builtin, Type, arg, opt};
 use crate::lang::error::Fault;
 use crate::lang::value::{Likelihood, Value};
-use crate::render::{Contours, View};
+use crate::render::{Contours, Frame, View};
+use crate::rng::Stream;
 use crate::vision::chamfer::{self, Mode};
 use crate::vision::contour_ratio;
 use crate::vision::{
-    Chamfer, ChamferOptions, ContourRatio, ContourRatioOptions, DepthLikelihood, Elements, MaskLikelihood,
+    Chamfer, ChamferOptions, ContourRatio, ContourRatioOptions, DepthLikelihood, DepthMap, Elements, MaskLikelihood,
+    VisionError,
 };
 use std::cell::RefCell;
 use std::sync::Arc;
@@ -229,12 +231,9 @@ struct MaskOf {
     eps: [f64; 2],
 }
 
-impl Likelihood for MaskOf {
-    fn name(&self) -> &'static str {
-        "scene.mask"
-    }
-
-    fn log_density(&self, observed: &Value) -> Result<f64, String> {
+impl MaskOf {
+    /// What is observed, ready at the size that is drawn, and what is drawn.
+    fn prepared(&self, observed: &Value) -> Result<(Arc<MaskLikelihood>, Arc<Frame>), String> {
         let Some(mask) = observed.downcast::<MaskValue>() else {
             return Err(format!("scene.mask: the observed value must be a mask, got {}", observed.type_name()));
         };
@@ -243,8 +242,29 @@ impl Likelihood for MaskOf {
         let prepared = mask.prepared.get((self.eps, frame.width, frame.height), |([i, o], w, h)| {
             MaskLikelihood::new(&mask.mask, *i, *o).map(|l| l.resized(*w, *h)).map_err(|e| format!("scene.mask: {e}"))
         })?;
+        Ok((prepared, frame))
+    }
+}
+
+impl Likelihood for MaskOf {
+    fn name(&self) -> &'static str {
+        "scene.mask"
+    }
+
+    fn log_density(&self, observed: &Value) -> Result<f64, String> {
+        let (prepared, frame) = self.prepared(observed)?;
         let rendered: Vec<bool> = frame.mask().collect();
         prepared.log_likelihood(&rendered, frame.width, frame.height).map_err(|e| format!("scene.mask: {e}"))
+    }
+
+    /// A mask of the size that is drawn.
+    fn sample(&self, observed: &Value, rng: &mut Stream) -> Option<Result<Value, String>> {
+        let draw = |(prepared, frame): (Arc<MaskLikelihood>, Arc<Frame>)| {
+            let rendered: Vec<bool> = frame.mask().collect();
+            let drawn = prepared.simulate(&rendered, rng).map_err(|e| format!("scene.mask: {e}"))?;
+            Ok(Value::object(MaskValue::new(drawn)))
+        };
+        Some(self.prepared(observed).and_then(draw))
     }
 }
 
@@ -255,12 +275,9 @@ struct DepthOf {
     options: [f64; 4],
 }
 
-impl Likelihood for DepthOf {
-    fn name(&self) -> &'static str {
-        "scene.depth"
-    }
-
-    fn log_density(&self, observed: &Value) -> Result<f64, String> {
+impl DepthOf {
+    /// What is observed, ready at the size that is drawn, and what is drawn.
+    fn prepared(&self, observed: &Value) -> Result<(Arc<DepthLikelihood>, Arc<Frame>), String> {
         let Some(depth) = observed.downcast::<DepthValue>() else {
             return Err(format!("scene.depth: the observed value must be a depth map, got {}", observed.type_name()));
         };
@@ -271,6 +288,30 @@ impl Likelihood for DepthOf {
                 let whole = DepthLikelihood::new(&depth.depth, *sd, *outlier, (*near, *far));
                 whole.map(|l| l.resized(*w, *h)).map_err(|e| format!("scene.depth: {e}"))
             })?;
+        Ok((prepared, frame))
+    }
+}
+
+impl Likelihood for DepthOf {
+    fn name(&self) -> &'static str {
+        "scene.depth"
+    }
+
+    fn log_density(&self, observed: &Value) -> Result<f64, String> {
+        let (prepared, frame) = self.prepared(observed)?;
         prepared.log_likelihood(&frame.depth, frame.width, frame.height).map_err(|e| format!("scene.depth: {e}"))
+    }
+
+    /// A map of the size that is drawn, missing where the observed one is.
+    fn sample(&self, observed: &Value, rng: &mut Stream) -> Option<Result<Value, String>> {
+        let wrong = |e: VisionError| format!("scene.depth: {e}");
+        let draw = |(prepared, frame): (Arc<DepthLikelihood>, Arc<Frame>)| {
+            let mut drawn = prepared.simulate(&frame.depth, rng).map_err(wrong)?;
+            let missing = prepared.observed().data().iter().map(|d| d.is_nan());
+            drawn.iter_mut().zip(missing).filter(|(_, m)| *m).for_each(|(d, _)| *d = f32::NAN);
+            let map = DepthMap::new(frame.width, frame.height, drawn).map_err(wrong)?;
+            Ok(Value::object(DepthValue::new(map)))
+        };
+        Some(self.prepared(observed).and_then(draw))
     }
 }

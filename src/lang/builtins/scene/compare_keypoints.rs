@@ -12,6 +12,7 @@ use crate::lang::adjoint::Adjoint;
 use crate::lang::builtins::{Builtin, Type, opt};
 use crate::lang::value::{Likelihood, Located, Value};
 use crate::render::{Camera, View};
+use crate::rng::Stream;
 use crate::vision::keypoints::{KeypointLikelihood, KeypointOptions, matching};
 use smallvec::smallvec;
 use std::sync::Arc;
@@ -74,6 +75,20 @@ impl Likelihood for KeypointsOf {
         Ok(sum)
     }
 
+    /// Detections of the joints that were detected, with the same confidence. One that is of no landmark stays.
+    fn sample(&self, observed: &Value, rng: &mut Stream) -> Option<Result<Value, String>> {
+        let KeypointsValue(seen) = observed.downcast::<KeypointsValue>()?;
+        let mut points = seen.points().to_vec();
+        let drawn = self.each(observed, |t| {
+            let at = t.model.sample(t.confidence, t.joint, rng);
+            let [w, h] = if seen.is_normalised() { [t.size.0, t.size.1] } else { [1.0; 2] };
+            if let Some(p) = points.get_mut(t.point) {
+                (p.x, p.y) = (at[0] / w, at[1] / h);
+            }
+        });
+        Some(drawn.map(|()| Value::object(KeypointsValue(seen.moved(&points)))))
+    }
+
     /// The landmarks that were detected, between where the scene has them and where they were seen.
     fn located(&self, observed: &Value) -> Vec<Located> {
         let mut all = Vec::new();
@@ -115,6 +130,8 @@ struct Term<'a> {
     seen: [f64; 2],
     confidence: f64,
     landmark: usize,
+    /// Which of the detections it is.
+    point: usize,
     /// Where the landmark is, in pixels of the picture.
     joint: Option<[f64; 2]>,
     /// Pixels of the picture in one of the camera's.
@@ -141,7 +158,7 @@ impl KeypointsOf {
             .map_err(|e| format!("scene.keypoints: {e}"))?;
         let whole = (f64::from(size.0), f64::from(size.1));
         let scale = [f64::from(size.0) / f64::from(camera.width), f64::from(size.1) / f64::from(camera.height)];
-        for (p, at) in seen.points().iter().zip(found) {
+        for (point, (p, at)) in seen.points().iter().zip(found).enumerate() {
             let Some((landmark, l)) = at.and_then(|i| Some((i, landmarks.get(i)?))) else { continue };
             let joint = project(l, camera, size);
             f(Term {
@@ -149,6 +166,7 @@ impl KeypointsOf {
                 seen: seen.position(p, size),
                 confidence: p.confidence,
                 landmark,
+                point,
                 joint,
                 scale,
                 size: whole,

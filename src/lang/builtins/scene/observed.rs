@@ -141,6 +141,10 @@ impl Object for MaskValue {
     fn as_any(&self) -> &dyn Any {
         self
     }
+
+    fn numbers(&self) -> Option<Vec<f64>> {
+        Some(self.mask.data().iter().map(|m| f64::from(u8::from(*m))).collect())
+    }
 }
 
 /// An observed depth map.
@@ -166,6 +170,11 @@ impl Object for DepthValue {
     fn as_any(&self) -> &dyn Any {
         self
     }
+
+    /// The depths; background is infinite.
+    fn numbers(&self) -> Option<Vec<f64>> {
+        Some(self.depth.data().iter().map(|d| f64::from(*d)).collect())
+    }
 }
 
 /// The joints of a person that a detector found; none where there is no detection.
@@ -187,5 +196,10 @@ impl Object for KeypointsValue {
 
     fn summary(&self) -> Option<String> {
         Some(format!("{} joints", self.0.points().len()))
+    }
+
+    /// The x and y of each joint.
+    fn numbers(&self) -> Option<Vec<f64>> {
+        Some(self.0.points().iter().flat_map(|p| [p.x, p.y]).collect())
     }
 }

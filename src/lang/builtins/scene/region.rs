@@ -3,11 +3,13 @@
 
 use super::compare::{SECTION, SEEN, SIZE, image, likelihood, size, view};
 use super::native;
+use super::observed::ImageValue;
 use crate::lang::builtins::{Args, Builtin, Type, opt};
 use crate::lang::error::Fault;
 use crate::lang::value::{Likelihood, Value};
-use crate::render::View;
-use crate::vision::region::Scratch;
+use crate::render::{Frame, View};
+use crate::rng::Stream;
+use crate::vision::region::{Quantised, Scratch};
 use crate::vision::{Region, RegionOptions};
 use std::cell::RefCell;
 use std::sync::Arc;
@@ -79,12 +81,9 @@ thread_local! {
     static SCRATCH: RefCell<(Vec<u8>, Scratch)> = RefCell::default();
 }
 
-impl Likelihood for RegionOf {
-    fn name(&self) -> &'static str {
-        "scene.region"
-    }
-
-    fn log_density(&self, observed: &Value) -> Result<f64, String> {
+impl RegionOf {
+    /// The observed colours, ready at the size that is drawn, and what is drawn.
+    fn prepared(&self, observed: &Value) -> Result<(Arc<Region>, Arc<Frame>), String> {
         let image = image(observed, &self.view, self.name())?;
         let Some(photo) = image.as_photo() else {
             return Err("scene.region: colours need a photograph, and only a contour map was observed".into());
@@ -95,14 +94,51 @@ impl Likelihood for RegionOf {
         let region = image.regions.get(key, |(options, w, h)| {
             Region::prepare(photo, *w, *h, options).map_err(|e| format!("scene.region: {e}"))
         })?;
+        Ok((region, frame))
+    }
+
+    /// The group of each pixel.
+    fn fill(&self, frame: &Frame, groups: &mut Vec<u8>) {
+        groups.clear();
+        match self.groups {
+            Groups::Silhouette => groups.extend(frame.mask().map(u8::from)),
+            Groups::Parts => groups.extend(frame.part.iter().map(|p| group(*p))),
+        }
+    }
+}
+
+impl Likelihood for RegionOf {
+    fn name(&self) -> &'static str {
+        "scene.region"
+    }
+
+    fn log_density(&self, observed: &Value) -> Result<f64, String> {
+        let (region, frame) = self.prepared(observed)?;
         Ok(SCRATCH.with_borrow_mut(|(groups, scratch)| {
-            groups.clear();
-            match self.groups {
-                Groups::Silhouette => groups.extend(frame.mask().map(u8::from)),
-                Groups::Parts => groups.extend(frame.part.iter().map(|p| group(*p))),
-            }
+            self.fill(&frame, groups);
             region.log_likelihood_with(groups, &frame.normal, scratch)
         }))
+    }
+
+    /// Where the options make it a probability of quantised pictures: the observed photograph with other numbers of colours in
+    /// its pixels, at the size that is drawn.
+    fn sample(&self, observed: &Value, rng: &mut Stream) -> Option<Result<Value, String>> {
+        if !self.is_proper() {
+            return None;
+        }
+        let draw = |(region, frame): (Arc<Region>, Arc<Frame>)| {
+            let mut groups = Vec::new();
+            self.fill(&frame, &mut groups);
+            let labels = region.simulate(&groups, rng);
+            let wrong = |e| format!("scene.region: {e}");
+            let picture = Quantised::new(frame.width, frame.height, region.colours(), labels).map_err(wrong)?;
+            let other = Region::of(&picture, &self.options).map_err(wrong)?;
+            let photo = image(observed, &self.view, self.name())?.as_photo().cloned();
+            let value = photo.map_or_else(ImageValue::default, ImageValue::photo);
+            value.regions.get((self.options.clone(), frame.width, frame.height), |_| Ok(other))?;
+            Ok(Value::object(value))
+        };
+        Some(self.prepared(observed).and_then(draw))
     }
 
     fn is_proper(&self) -> bool {
@@ -119,7 +155,6 @@ fn group(part: u16) -> u8 {
 mod tests {
     use super::*;
     use crate::geom::{Profile, Solid, lathe};
-    use crate::lang::builtins::scene::ImageValue;
     use crate::render::Camera;
     use crate::vision::{ContourMap, Photo};
 

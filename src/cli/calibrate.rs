@@ -1,0 +1,191 @@
+//! `pcadlang check --sbc` and `--geweke`: whether a program's plan draws from its posterior. The statistics are the library's
+//! ([`pcadlang::infer::calibration`]); here is what is run, and what is said of it.
+
+use super::args::{Check, Given, Job, Sampling};
+use super::job::{Interrupt, machine_threads};
+use super::{Failure, given, plain, progress};
+use pcadlang::infer::calibration::{
+    CalibrationError, FALSE_ALARMS, Geweke, PlanSampler, RANKS, Sampler, Sbc, Settings, geweke, sbc,
+};
+use pcadlang::infer::{Progress, RunOptions};
+use pcadlang::report::{number, seconds, table};
+use pcadlang::{Model, infer};
+use std::sync::Arc;
+use std::sync::atomic::{AtomicBool, Ordering};
+use std::time::Instant;
+
+/// Data sets of `--sbc`, chains of `--geweke`, where none are asked for.
+const REPLICATES: (u32, u32) = (200, 100);
+
+/// Simulates from each program and says whether its plan passes.
+pub fn calibrate(a: &Check) -> Result<(), Failure> {
+    let interrupt = Interrupt::listen();
+    let mut failed = Vec::new();
+    for path in &a.programs {
+        let job = job(a, path);
+        let (program, _) = given::observe(given::program(&job.given, false)?, &job)?;
+        let model = program.compile()?;
+        let mut passes = true;
+        if a.sbc {
+            let (said, took) = run(a, &model, &interrupt, REPLICATES.0, sbc)?;
+            print!("{}", ranks(path, &said, a.seed, took));
+            passes &= said.passes();
+        }
+        if a.geweke {
+            let (said, took) = run(a, &model, &interrupt, REPLICATES.1, geweke)?;
+            print!("{}", turns(path, &said, a.seed, took));
+            passes &= said.passes();
+        }
+        if !passes {
+            failed.push(path.as_str());
+        }
+    }
+    if failed.is_empty() {
+        Ok(())
+    } else {
+        let (n, of) = (failed.len(), a.programs.len());
+        Err(plain(format!("{n} of {of} programs fail: {}", failed.join(", "))))
+    }
+}
+
+/// What the program is given, as `run` has it.
+fn job(a: &Check, path: &str) -> Job {
+    Job {
+        features_from: None,
+        given: Given { program: path.to_owned(), sets: a.sets.clone(), camera: None },
+        observe: a.observe.clone(),
+        observe_contours: None,
+        keypoints: None,
+        sampling: Sampling {
+            seed: a.seed,
+            chains: 1,
+            threads: a.threads,
+            steps: a.steps,
+            warmup: None,
+            time: None,
+            no_incremental: false,
+        },
+    }
+}
+
+/// One of the two checks.
+type Method<T> = fn(&Arc<pcadlang::lang::code::Code>, &dyn Sampler, &Settings) -> Result<T, CalibrationError>;
+
+fn run<T>(
+    a: &Check,
+    model: &Model,
+    interrupt: &Interrupt,
+    replicates: u32,
+    method: Method<T>,
+) -> Result<(T, f64), Failure> {
+    let begun = Instant::now();
+    let (plan, _) = model.plan()?;
+    let settings = Settings {
+        replicates: a.replicates.unwrap_or(replicates) as usize,
+        seed: a.seed,
+        threads: a.threads.map_or_else(machine_threads, |n| n as usize),
+        steps: a.steps,
+        ..Settings::default()
+    };
+    let (progress, done) = (Arc::new(Progress::default()), AtomicBool::new(false));
+    interrupt.ends(&progress);
+    let options = RunOptions { seed: a.seed, ..RunOptions::default() };
+    let sampler = PlanSampler { plan: &plan, options, progress: &progress };
+    let said = std::thread::scope(|scope| {
+        scope.spawn(|| progress::watch(&progress, &done, None, false));
+        let said = method(model.code(), &sampler, &settings);
+        done.store(true, Ordering::Relaxed);
+        said
+    });
+    if progress.cancelled.load(Ordering::Relaxed) {
+        return Err(Failure::Interrupted);
+    }
+    said.map(|said| (said, begun.elapsed().as_secs_f64())).map_err(|e| failure(e, model))
+}
+
+fn failure(e: infer::calibration::CalibrationError, model: &Model) -> Failure {
+    match e {
+        CalibrationError::NotSimulable(reason) => {
+            let hint = "programs are checked on data of their own: proper priors, and observations that have samplers";
+            Failure::Plain(reason, Some(hint.into()))
+        }
+        CalibrationError::TooFew(reason) => plain(reason),
+        CalibrationError::Chain(e) => model.chain_error(e).into(),
+    }
+}
+
+/// The table of `--sbc`.
+fn ranks(path: &str, said: &Sbc, seed: u64, took: f64) -> String {
+    let mut rows = vec![["quantity", "ranks", "chi2", "p", "least ess", "verdict"].map(str::to_owned).to_vec()];
+    for r in &said.rows {
+        let verdict = match (r.passes, r.is_short) {
+            (true, false) => "ok",
+            (true, true) => "ok, few draws",
+            (false, false) => "FAILS",
+            (false, true) => "FAILS, few draws",
+        };
+        let ess = format!("{:.0}", r.least_ess);
+        rows.push(vec![r.name.clone(), bars(&r.counts), number(r.chi_square), number(r.p), ess, verdict.into()]);
+    }
+    let mut s = format!("{path}: simulation-based calibration\n{}", table::aligned(&rows));
+    s.push_str(&more(said.left_out));
+    s.push_str(&format!(
+        "{} data sets; ranks among {} draws in {} bins; fails below p = {} ({FALSE_ALARMS} over {} quantities)\n",
+        said.replicates,
+        RANKS - 1,
+        said.bins,
+        number(said.threshold),
+        said.rows.len(),
+    ));
+    if said.rows.iter().any(|r| r.is_short) {
+        s.push_str("few draws: chains have fewer independent draws than are ranked; give more with --steps\n");
+    }
+    s.push_str(&format!("seed {seed}, {} steps a chain, {}\n", said.steps, seconds(took)));
+    s
+}
+
+/// The table of `--geweke`.
+fn turns(path: &str, said: &Geweke, seed: u64, took: f64) -> String {
+    let head = ["quantity", "median, prior", "median, turns", "z mean", "z square", "verdict"];
+    let mut rows = vec![head.map(str::to_owned).to_vec()];
+    for r in &said.rows {
+        let z = |z: f64| format!("{z:.2}");
+        let verdict = if r.passes { "ok" } else { "FAILS" };
+        let (a, b) = (number(r.marginal), number(r.successive));
+        rows.push(vec![r.name.clone(), a, b, z(r.z_mean), z(r.z_square), verdict.into()]);
+    }
+    let mut s = format!("{path}: Geweke's joint distribution test\n{}", table::aligned(&rows));
+    s.push_str(&more(said.left_out));
+    s.push_str(&format!(
+        "{} chains of {} turns against {} draws from the prior; fails beyond |z| = {:.2} ({FALSE_ALARMS} over {} scores)\n",
+        said.chains,
+        said.turns,
+        said.marginal,
+        said.threshold,
+        2 * said.rows.len(),
+    ));
+    s.push_str(&format!("seed {seed}, {}\n", seconds(took)));
+    s
+}
+
+fn more(left_out: usize) -> String {
+    if left_out == 0 { String::new() } else { format!("… and {left_out} more, which fewer states have\n") }
+}
+
+/// Counts as bars, level with the largest.
+fn bars(counts: &[u32]) -> String {
+    const BARS: [char; 9] = [' ', '▁', '▂', '▃', '▄', '▅', '▆', '▇', '█'];
+    let most = counts.iter().copied().max().unwrap_or(0).max(1);
+    counts.iter().map(|c| BARS[(8 * c).div_ceil(most).min(8) as usize]).collect()
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    #[test]
+    fn bars_are_level_with_the_largest() {
+        assert_eq!(bars(&[0, 1, 4, 8]), " ▁▄█");
+        assert_eq!(bars(&[0, 0]), "  ");
+    }
+}

@@ -1,0 +1,160 @@
+//! `pcadlang predict`: what would be observed again, drawn from the prior or the posterior, against what is observed. The draws
+//! are the library's ([`pcadlang::infer::predictive`]); here they become a table and a file.
+
+use super::args::Predict;
+use super::job::{self, Interrupt, write};
+use super::{Failure, plain, progress};
+use pcadlang::infer::draws::{Discard, Sink};
+use pcadlang::infer::predictive::{Predictive, Replication, STATISTICS, observed, prior, statistics, tail};
+use pcadlang::infer::{Progress, diagnostics};
+use pcadlang::report::{RunDir, number, seconds, table};
+use pcadlang::trace::Limits;
+use pcadlang::{Model, RunOptions};
+use std::fmt::Write;
+use std::path::Path;
+use std::sync::Arc;
+use std::sync::atomic::{AtomicBool, Ordering};
+use std::time::Instant;
+
+/// Beyond so many numbers in all, only statistics are written.
+const ELEMENTS: usize = 200;
+/// A tail probability below this, or above one less it, is marked.
+const EXTREME: f64 = 0.01;
+
+/// Draws, writes `predictive.csv`, prints the table.
+pub fn predict(a: &Predict) -> Result<(), Failure> {
+    let begun = Instant::now();
+    let ready = job::prepare(&a.job, false)?;
+    let model = &ready.model;
+    let (what, draws) = match a.prior {
+        true => ("prior", vec![from_prior(a, model)?]),
+        false => ("posterior", from_posterior(a, model)?),
+    };
+    let now = observed(&model.simulate(a.job.sampling.seed, 0)?);
+    let silent: Vec<&(String, String)> =
+        draws.iter().flatten().next().map_or(Vec::new(), |r| r.silent.iter().collect());
+    if draws.iter().flatten().all(|r| r.groups.is_empty()) {
+        let named: Vec<String> = silent.iter().map(|(name, what)| format!("{name} is {what}")).collect();
+        let hint = (!named.is_empty()).then(|| named.join("; "));
+        return Err(Failure::Plain("no observation of the program has a sampler".into(), hint));
+    }
+    let stem = job::stem(&a.job.given.program);
+    let dir = match &a.out {
+        Some(path) => RunDir::create(path),
+        None => RunDir::fresh(Path::new("runs"), &format!("{stem}-predictive")),
+    };
+    let dir = dir.map_err(|e| plain(e.to_string()))?;
+    write(&dir, "predictive.csv", csv(&now, &draws).as_bytes())?;
+    print!("{}", compared(what, &now, &draws));
+    for (name, what) in silent {
+        println!("note: {name} is {what}: it is left out");
+    }
+    let count: usize = draws.iter().map(Vec::len).sum();
+    let took = seconds(begun.elapsed().as_secs_f64());
+    println!("seed {}, {count} draws from the {what} in {took}\n{}", a.job.sampling.seed, dir.path().display());
+    Ok(())
+}
+
+fn from_prior(a: &Predict, model: &Model) -> Result<Vec<Replication>, Failure> {
+    let drawn = prior(model.code(), a.job.sampling.seed, a.n, job::threads(&a.job), Limits::default());
+    drawn.map_err(|e| model.chain_error(e).into())
+}
+
+fn from_posterior(a: &Predict, model: &Model) -> Result<Vec<Vec<Replication>>, Failure> {
+    let s = &a.job.sampling;
+    let watch = Predictive::new(s.chains, s.seed);
+    let options = RunOptions {
+        seed: s.seed,
+        steps: s.steps,
+        warmup: s.warmup,
+        time: s.time,
+        incremental: !s.no_incremental,
+        watch: Some(Arc::new(watch.clone())),
+        ..RunOptions::default()
+    };
+    let sinks = (0..s.chains).map(|_| Box::new(Discard) as Box<dyn Sink>).collect();
+    let (progress, done) = (Arc::new(Progress::default()), AtomicBool::new(false));
+    let interrupt = Interrupt::listen();
+    interrupt.ends(&progress);
+    let results = std::thread::scope(|scope| {
+        scope.spawn(|| progress::watch(&progress, &done, s.time, false));
+        let results = model.run_into(&options, job::threads(&a.job), &progress, sinks);
+        done.store(true, Ordering::Relaxed);
+        results
+    })?;
+    results.into_iter().collect::<Result<Vec<_>, _>>().map_err(|e| model.chain_error(e))?;
+    if progress.cancelled.load(Ordering::Relaxed) {
+        return Err(Failure::Interrupted);
+    }
+    watch.draws().map_err(|e| model.run_error(*e).into())
+}
+
+/// One row a test statistic of an observation.
+fn compared(what: &str, now: &Replication, draws: &[Vec<Replication>]) -> String {
+    let head = ["observation", "statistic", "observed", "5%", "50%", "95%", "tail"];
+    let mut rows = vec![head.map(str::to_owned).to_vec()];
+    let mut marked = false;
+    for group in &now.groups {
+        let all: Vec<[f64; 4]> =
+            draws.iter().flatten().filter_map(|r| r.get(&group.name)).map(|g| statistics(&g.numbers)).collect();
+        if all.is_empty() {
+            continue;
+        }
+        let here = statistics(&group.numbers);
+        for (k, name) in STATISTICS.iter().enumerate() {
+            let mut replicated: Vec<f64> = all.iter().map(|s| s[k]).filter(|x| !x.is_nan()).collect();
+            replicated.sort_by(f64::total_cmp);
+            // One number has no spread, and is its own mean, least and greatest.
+            if replicated.is_empty() || group.numbers.len() == 1 && k > 0 {
+                continue;
+            }
+            let p = tail(here[k], &replicated);
+            let extreme = !(EXTREME..=1.0 - EXTREME).contains(&p);
+            marked |= extreme;
+            let q = |p: f64| number(diagnostics::quantile_sorted(&replicated, p));
+            let tail = format!("{p:.3}{}", if extreme { " *" } else { "" });
+            let label = if group.numbers.len() == 1 { "value" } else { name };
+            rows.push(vec![group.name.clone(), label.into(), number(here[k]), q(0.05), q(0.5), q(0.95), tail]);
+        }
+    }
+    let mut s = table::aligned(&rows);
+    let _ = writeln!(s, "tail: the share of {what} replications beyond what is observed; 0.5 is in the middle");
+    if marked {
+        let _ = writeln!(s, "*: beyond {EXTREME} on one side: the program does not make data like these");
+    }
+    s
+}
+
+/// Statistics of every draw, and the numbers themselves where they are few. What a draw lacks is empty.
+fn csv(now: &Replication, draws: &[Vec<Replication>]) -> String {
+    let total: usize = now.groups.iter().map(|g| g.numbers.len()).sum();
+    let whole = total <= ELEMENTS;
+    let mut s = "chain,draw".to_owned();
+    for g in &now.groups {
+        STATISTICS.iter().for_each(|k| s.push_str(&format!(",{}", quoted(&format!("{}.{k}", g.name)))));
+        if whole {
+            (0..g.numbers.len()).for_each(|i| s.push_str(&format!(",{}", quoted(&format!("{}[{i}]", g.name)))));
+        }
+    }
+    s.push('\n');
+    for (chain, all) in draws.iter().enumerate() {
+        for (draw, r) in all.iter().enumerate() {
+            let _ = write!(s, "{},{draw}", chain + 1);
+            for g in &now.groups {
+                let numbers = r.get(&g.name).map_or(&[][..], |g| &g.numbers);
+                let own = if whole { g.numbers.len() } else { 0 };
+                let elements = (0..own).map(|i| numbers.get(i).copied().unwrap_or(f64::NAN));
+                for x in statistics(numbers).into_iter().chain(elements) {
+                    let _ = if x.is_nan() { write!(s, ",") } else { write!(s, ",{x}") };
+                }
+            }
+            s.push('\n');
+        }
+    }
+    s
+}
+
+/// A field as RFC 4180 has it.
+fn quoted(name: &str) -> String {
+    if name.contains([',', '"', '\n']) { format!("\"{}\"", name.replace('"', "\"\"")) } else { name.to_owned() }
+}

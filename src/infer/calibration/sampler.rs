@@ -1,0 +1,72 @@
+//! What is checked: something that runs a chain and shows its states.
+
+use crate::infer::draws::Discard;
+use crate::infer::kernel::{At, Kernel};
+use crate::infer::plan::{ChainError, Progress, RunOptions, Watch, run_chain};
+use crate::infer::{Start, starts};
+use crate::lang::code::Code;
+use crate::rng::{Purpose, StreamKey};
+use crate::syntax::ast::KStmt;
+use crate::trace::{Draws, Limits};
+use std::sync::Arc;
+
+/// Something that draws from the posterior of a program.
+pub trait Sampler: Sync {
+    /// Runs a chain and shows its states, one draw after the other, to `watch`, which may put the chain in another state.
+    /// `steps` bounds the kernel applications after warm-up, in place of the sampler's own number. Gives how many there were.
+    ///
+    /// # Errors
+    /// If the chain cannot start or fails.
+    fn run(&self, code: &Arc<Code>, chain: u32, steps: Option<u64>, watch: Arc<dyn Watch>) -> Result<u64, ChainError>;
+}
+
+/// The plan of a program.
+pub struct PlanSampler<'a> {
+    /// The statements of its `infer` block.
+    pub plan: &'a [KStmt],
+    /// Seed, warm-up, limits; steps and watch are the check's.
+    pub options: RunOptions,
+    /// Counts steps, and ends chains early when cancelled.
+    pub progress: &'a Progress,
+}
+
+impl Sampler for PlanSampler<'_> {
+    fn run(&self, code: &Arc<Code>, chain: u32, steps: Option<u64>, watch: Arc<dyn Watch>) -> Result<u64, ChainError> {
+        let options = RunOptions { steps: steps.or(self.options.steps), watch: Some(watch), ..self.options.clone() };
+        let done = run_chain(code, self.plan, &options, self.progress, &mut Discard, chain)?;
+        Ok(done.steps)
+    }
+}
+
+/// One kernel in a loop, starting from a draw from the prior: for kernels of one's own.
+pub struct KernelSampler<F> {
+    /// Makes the kernel of a chain.
+    pub kernel: F,
+    /// The seed.
+    pub seed: u64,
+    /// Applications before the first draw, in which it may adapt.
+    pub warmup: u64,
+    /// Applications between draws; at least 1.
+    pub every: u64,
+    /// Draws, where the check asks for no number of steps.
+    pub draws: u64,
+}
+
+impl<F: Fn() -> Box<dyn Kernel> + Sync> Sampler for KernelSampler<F> {
+    fn run(&self, code: &Arc<Code>, chain: u32, steps: Option<u64>, watch: Arc<dyn Watch>) -> Result<u64, ChainError> {
+        let begun = starts(code, self.seed, chain, Start::default(), Limits::default()).map_err(ChainError::Start)?;
+        let Some(mut trace) = begun.into_iter().next() else { return Ok(0) };
+        let mut kernel = (self.kernel)();
+        let every = self.every.max(1);
+        let steps = steps.unwrap_or(self.draws * every);
+        let predict = StreamKey::new(self.seed, chain, Purpose::PREDICT);
+        for step in 0..self.warmup + steps {
+            let adapting = step < self.warmup;
+            kernel.step(&mut trace, &At { adapting, ..At::new(self.seed, chain, step) })?;
+            if !adapting && (step - self.warmup + 1).is_multiple_of(every) {
+                watch.draw(chain, &mut trace, Draws { key: predict, step, lane: 0 });
+            }
+        }
+        Ok(steps)
+    }
+}

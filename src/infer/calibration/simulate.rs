@@ -1,0 +1,112 @@
+//! States and data drawn from the joint distribution of a program: choices from the prior, then every observation from its own
+//! distribution given them.
+//!
+//! A program that is no such distribution is refused, with what stands in the way: a factor, a likelihood without a sampler,
+//! an improper prior, frozen choices, observations that are there or not by chance, observed values that depend on choices.
+
+use super::{CalibrationError, Settings};
+use crate::infer::plan::ChainError;
+use crate::infer::{StartError, init::NoStart};
+use crate::lang::code::{Code, Observed};
+use crate::lang::value::Value;
+use crate::rng::{Purpose, StreamKey};
+use crate::trace::{Draws, Limits, Observation, Selector, Trace};
+use std::sync::Arc;
+
+/// How often a draw from the prior may lead where the program has no value before that is an error.
+const RETRIES: u64 = 1000;
+
+/// A state with data drawn from it.
+pub(super) struct Simulated {
+    /// The state, its observations replaced by the data.
+    pub trace: Trace,
+    /// The data, by the hash of the observation's address.
+    pub data: Arc<Observed>,
+    /// What the program itself observes.
+    given: Vec<Observation>,
+}
+
+/// The randomness of redrawing observations for the `step`-th time.
+pub(in crate::infer) fn replicating(seed: u64, index: u32, step: u64) -> Draws {
+    Draws { key: StreamKey::new(seed, index, Purpose::REPLICATE), step, lane: 0 }
+}
+
+/// Draws a state and data.
+pub(super) fn simulate(code: &Arc<Code>, settings: &Settings, index: u32) -> Result<Simulated, CalibrationError> {
+    let trace = state(code, settings.limits, settings.seed, index)?;
+    with_data(trace, settings, index)
+}
+
+/// Draws a state from the prior. Where the program has no value (a scale that is not positive) the prior has no mass: kernels
+/// reject such states, so they are drawn again here.
+pub(in crate::infer) fn state(code: &Arc<Code>, limits: Limits, seed: u64, index: u32) -> Result<Trace, ChainError> {
+    let key = StreamKey::new(seed, index, Purpose::TRUTH);
+    let mut last = None;
+    for step in 0..RETRIES {
+        match Trace::simulate(Arc::clone(code), Draws { key, step, lane: 0 }, limits) {
+            Ok(trace) => return Ok(trace),
+            Err(e) if e.is_recoverable() => last = Some(e),
+            Err(e) => return Err(e.into()),
+        }
+    }
+    Err(ChainError::Start(match last {
+        Some(e) => StartError::Run(e),
+        None => StartError::Impossible(NoStart::default()),
+    }))
+}
+
+fn with_data(mut trace: Trace, settings: &Settings, index: u32) -> Result<Simulated, CalibrationError> {
+    let refuse = |reason: String| Err(CalibrationError::NotSimulable(reason));
+    if !trace.code().freezes.is_empty() {
+        return refuse(
+            "`freeze` keeps choices where each chain starts, so that they have no posterior to check".into(),
+        );
+    }
+    let drawn = trace.replicate(replicating(settings.seed, index, 0))?;
+    if let Some((address, what)) = drawn.silent.first() {
+        let more = match drawn.silent.len() {
+            1 => String::new(),
+            n => format!(" (and {} more)", n - 1),
+        };
+        return refuse(format!(
+            "data cannot be drawn from the program: {address} is {what}, which has no sampler{more}"
+        ));
+    }
+    let all = trace.select(&Selector::All);
+    let targets = trace.targets(all).to_vec();
+    if let Some(t) = targets.iter().find(|t| trace.dist(**t).is_some_and(|d| d.is_improper())) {
+        let address = trace.address(*t);
+        return refuse(format!("the prior of {address} is improper: there is nothing to draw true values from"));
+    }
+    let given = trace.observed();
+    if given.is_empty() {
+        return refuse("the program observes nothing".into());
+    }
+    trace.set_observed(&drawn.values)?;
+    trace.commit();
+    Ok(Simulated { trace, data: Arc::new(drawn.values.into_iter().collect()), given })
+}
+
+/// Refuses programs whose set of observations, or what they observe, is a matter of chance: `a` and `b` are two draws.
+pub(super) fn same_data(a: &Simulated, b: &Simulated) -> Result<(), CalibrationError> {
+    let refuse = |reason: String| Err(CalibrationError::NotSimulable(reason));
+    for (x, y) in [(a, b), (b, a)] {
+        for o in &x.given {
+            match y.given.iter().find(|p| p.hash == o.hash) {
+                None => {
+                    return refuse(format!(
+                        "the observation {} is there or not as choices have it: a program checked like this observes the same \
+                         things always",
+                        o.address
+                    ));
+                }
+                // Objects are equal only if they are the same one.
+                Some(p) if !p.value.same(&o.value) && !matches!(p.value, Value::Object(_)) => {
+                    return refuse(format!("what {} observes depends on choices: it is no data", o.address));
+                }
+                Some(_) => {}
+            }
+        }
+    }
+    Ok(())
+}

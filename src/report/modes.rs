@@ -1,0 +1,176 @@
+//! The places that chains stay at, where they disagree: reported one by one, besides the means over all of them.
+
+use super::{Quantity, number, table};
+use crate::infer::diagnostics;
+use indexmap::IndexMap;
+use serde::Serialize;
+use std::fmt::Write;
+
+/// Chains whose worst R-hat is above this are looked at for modes.
+pub const DISAGREE: f64 = 1.1;
+/// Quantities that chains are compared by: those with the largest R-hat.
+const COMPARED: usize = 20;
+/// Columns and rows of the table.
+const SHOWN: (usize, usize) = (5, 8);
+
+/// Chains that agree with each other and not with the rest.
+#[derive(Clone, Debug, PartialEq, Serialize)]
+pub struct Mode {
+    /// Their numbers, from 1.
+    pub chains: Vec<usize>,
+    /// How many of all chains they are. Chains fall where they start: it is no probability.
+    pub share: f64,
+    /// The mean log joint density of their draws.
+    pub log_joint: f64,
+    /// The mean and standard deviation of each quantity over their draws.
+    pub quantities: IndexMap<String, [f64; 2]>,
+}
+
+/// The modes of a run, the largest first; none where the chains agree, or cannot be told apart.
+pub fn modes(quantities: &[Quantity]) -> Vec<Mode> {
+    let worst = apart(quantities);
+    let compared: Vec<&[Vec<f64>]> = worst.iter().take(COMPARED).map(|q| &q.chains[..]).collect();
+    let groups = diagnostics::modes(&compared);
+    if groups.len() < 2 {
+        return Vec::new();
+    }
+    let count: usize = groups.iter().map(Vec::len).sum();
+    groups.iter().map(|members| mode(quantities, members, count)).collect()
+}
+
+/// The quantities that chains may disagree on, the worst first. Those that never moved have no R-hat, but may be at several
+/// places.
+fn apart(quantities: &[Quantity]) -> Vec<&Quantity> {
+    let rank = |q: &Quantity| if q.summary.r_hat.is_nan() { f64::INFINITY } else { q.summary.r_hat };
+    let mut worst: Vec<&Quantity> = quantities.iter().filter(|q| rank(q) > DISAGREE).collect();
+    worst.sort_by(|a, b| rank(b).total_cmp(&rank(a)));
+    worst
+}
+
+fn mode(quantities: &[Quantity], members: &[usize], count: usize) -> Mode {
+    let moments = |q: &Quantity| {
+        let own: Vec<&Vec<f64>> = members.iter().filter_map(|c| q.chains.get(*c)).collect();
+        let s = diagnostics::summary(&own);
+        [s.mean, s.sd]
+    };
+    let all: IndexMap<String, [f64; 2]> = quantities.iter().map(|q| (q.name.clone(), moments(q))).collect();
+    Mode {
+        chains: members.iter().map(|c| c + 1).collect(),
+        share: members.len() as f64 / count as f64,
+        log_joint: all.first().map_or(f64::NAN, |(_, m)| m[0]),
+        quantities: all,
+    }
+}
+
+/// The means of the quantities that differ most, a column a mode; nothing without modes.
+pub fn modes_table(modes: &[Mode], quantities: &[Quantity]) -> String {
+    let rows = modes_rows(modes, quantities);
+    if rows.is_empty() {
+        return String::new();
+    }
+    let mut s = format!("the chains stay at {} different places:\n{}", modes.len(), table::aligned(&rows));
+    if let Some(more) = modes.len().checked_sub(SHOWN.0 + 1) {
+        let _ = writeln!(s, "… and {} more places, in summary.json", more + 1);
+    }
+    s
+}
+
+/// The cells of [`modes_table`].
+pub(super) fn modes_rows(modes: &[Mode], quantities: &[Quantity]) -> Vec<Vec<String>> {
+    if modes.is_empty() {
+        return Vec::new();
+    }
+    let shown = &modes[..modes.len().min(SHOWN.0)];
+    let row = |name: &str, all: String, each: &dyn Fn(&Mode) -> String| {
+        [name.to_owned(), all].into_iter().chain(shown.iter().map(each)).collect::<Vec<String>>()
+    };
+    let mut head = vec!["mean of".to_owned(), "all chains".to_owned()];
+    head.extend((1..=shown.len()).map(|i| format!("place {i}")));
+    let count: usize = modes.iter().map(|m| m.chains.len()).sum();
+    let mut rows = vec![head, row("chains", count.to_string(), &|m| m.chains.len().to_string())];
+    let mean = |q: &Quantity, m: &Mode| m.quantities.get(&q.name).map_or(f64::NAN, |x| x[0]);
+    let differs = |q: &Quantity| modes.iter().any(|m| mean(q, m).to_bits() != mean(q, &modes[0]).to_bits());
+    let mut differ = apart(quantities);
+    differ.retain(|q| differs(q));
+    differ.truncate(SHOWN.1);
+    let first = quantities.first().filter(|f| !differ.iter().any(|q| q.name == f.name));
+    for q in first.into_iter().chain(differ) {
+        rows.push(row(&q.name, number(q.summary.mean), &|m| number(mean(q, m))));
+    }
+    table::narrowed(rows)
+}
+
+/// What to tell the user: a sentence where there are modes.
+pub(super) fn warning(modes: &[Mode]) -> Option<String> {
+    let chains: usize = modes.iter().map(|m| m.chains.len()).sum();
+    let (n, each) = (modes.len(), modes.iter().all(|m| m.chains.len() == 1));
+    if n < 2 {
+        return None;
+    }
+    let what = match each {
+        true => format!("each of the {chains} chains stays at a place of its own"),
+        false => format!("the {chains} chains stay at {n} different places"),
+    };
+    Some(format!(
+        "{what}, so means over all of them say little: look at each place; a longer warmup, `temper` or `knn` may join them (how \
+         many chains are at a place is not its probability)"
+    ))
+}
+
+/// An R-hat for people: chains at different places have one as large as they are apart.
+pub fn r_hat_text(r: f64) -> String {
+    match r {
+        r if r.is_nan() => "-".into(),
+        r if r > 100.0 => ">100".into(),
+        r if r >= 10.0 => format!("{r:.1}"),
+        r => format!("{r:.3}"),
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+    use crate::infer::diagnostics::summary;
+
+    fn noise(seed: u64, centre: f64) -> Vec<f64> {
+        (0..400u64).map(|i| centre + ((i + 1) * (i + seed) * 2_654_435_761 % 1_000_003) as f64 / 1_000_003.0).collect()
+    }
+
+    fn quantity(name: &str, centres: [f64; 4]) -> Quantity {
+        let chains: Vec<Vec<f64>> = centres.iter().zip(0..).map(|(c, s)| noise(13 + 977 * s, *c)).collect();
+        Quantity { name: name.into(), column: None, summary: summary(&chains), chains }
+    }
+
+    #[test]
+    fn modes_have_their_own_means_and_a_table() {
+        let all = [
+            quantity("log_joint", [-1.0, -9.0, -1.0, -1.0]),
+            quantity("x", [0.0, 30.0, 0.0, 0.0]),
+            quantity("y", [7.0; 4]),
+        ];
+        let found = modes(&all);
+        assert_eq!(found.iter().map(|m| m.chains.clone()).collect::<Vec<_>>(), [vec![1, 3, 4], vec![2]]);
+        assert_eq!((found[0].share, found[1].share), (0.75, 0.25));
+        assert!((found[1].quantities["x"][0] - 30.5).abs() < 0.1 && (found[1].log_joint + 8.5).abs() < 0.1);
+        let text = modes_table(&found, &all);
+        let lines: Vec<Vec<&str>> = text.lines().map(|l| l.split_whitespace().collect()).collect();
+        assert_eq!(lines[0].join(" "), "the chains stay at 2 different places:");
+        assert_eq!(lines[2], ["chains", "4", "3", "1"]);
+        assert!(lines.iter().any(|l| l[0] == "x") && !lines.iter().any(|l| l[0] == "y"), "{text}");
+        assert!(text.lines().all(|l| l.chars().count() <= table::COLUMNS));
+        assert!(warning(&found).is_some_and(|w| w.starts_with("the 4 chains stay at 2 different places")));
+        assert!(serde_json::to_string(&found).is_ok_and(|j| j.contains("\"chains\":[1,3,4]")));
+    }
+
+    #[test]
+    fn chains_that_agree_have_none() {
+        let all = [quantity("log_joint", [0.0; 4]), quantity("x", [3.0; 4])];
+        assert!(modes(&all).is_empty() && modes_table(&[], &all).is_empty() && warning(&[]).is_none());
+    }
+
+    #[test]
+    fn r_hat_reads_well() {
+        let texts = [f64::NAN, 1.0042, 12.345, 3e6, f64::INFINITY].map(r_hat_text);
+        assert_eq!(texts, ["-", "1.004", "12.3", ">100", ">100"]);
+    }
+}

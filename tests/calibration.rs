@@ -1,0 +1,139 @@
+//! Kernels and shipped programs draw from the posterior of data simulated from the model: simulation-based calibration
+//! (Talts et al. 2018) and Geweke's joint distribution test (2004). Planted errors are found in
+//! `tests/planted_errors.rs`.
+//!
+//! The checks fail a right sampler once in a thousand; seeds are fixed. The slow ones: `cargo test --release -- --ignored`.
+
+mod common;
+use common::kernels::CALIBRATED;
+use pcadlang::infer::calibration::{PlanSampler, Settings, geweke, sbc};
+use pcadlang::infer::{Progress, RunOptions};
+use pcadlang::lang::builtins::scene::{DepthValue, ImageValue, KeypointsValue, MaskValue};
+use pcadlang::lang::value::Value;
+use pcadlang::vision::keypoints::Keypoint;
+use pcadlang::vision::{DepthMap, Keypoints, Mask, Photo};
+use pcadlang::{Model, Program};
+use std::sync::Arc;
+
+/// Which of the two checks, over how many data sets or chains, and steps of each chain.
+#[derive(Clone, Copy)]
+enum Check {
+    Ranks(usize, Option<u64>),
+    Turns(usize, Option<u64>),
+}
+
+fn passes(name: &str, model: &Model, check: Check) {
+    let (plan, _) = model.plan().unwrap_or_else(|e| panic!("{e}"));
+    let progress = Progress::default();
+    let options = RunOptions { seed: 1, ..RunOptions::default() };
+    let sampler = PlanSampler { plan: &plan, options, progress: &progress };
+    let (Check::Ranks(replicates, steps) | Check::Turns(replicates, steps)) = check;
+    let settings = Settings { replicates, steps, seed: 1, threads: 2, ..Settings::default() };
+    match check {
+        Check::Ranks(..) => {
+            let said = sbc(model.code(), &sampler, &settings).unwrap_or_else(|e| panic!("{name}: {e:?}"));
+            assert!(said.passes(), "{name}: {said:#?}");
+        }
+        Check::Turns(..) => {
+            let said = geweke(model.code(), &sampler, &settings).unwrap_or_else(|e| panic!("{name}: {e:?}"));
+            assert!(said.passes(), "{name}: {said:#?}");
+        }
+    }
+}
+
+/// A choice of each kind: of two values, Gaussian, positive.
+fn small(kernel: &str) -> Model {
+    let k = if kernel.ends_with([';', '}']) { kernel.to_owned() } else { format!("{kernel};") };
+    Model::from_text(&format!(
+        "assume c ~ flip(0.4); assume m ~ normal(if c {{ 1 }} else {{ -1 }}, 1); assume s ~ gamma(3, 3);
+         observe normal(m, s) = [0, 1, 2] as y;
+         infer {{ warmup 200 {{ {k} }} repeat 60 {{ repeat 4 {{ {k} }} collect c, m, s; }} }}"
+    ))
+    .unwrap_or_else(|e| panic!("{kernel}: {e}"))
+}
+
+#[test]
+#[ignore = "minutes"]
+fn ranks_under_every_kernel() {
+    for kernel in CALIBRATED {
+        passes(kernel, &small(kernel), Check::Ranks(60, None));
+    }
+}
+
+#[test]
+fn turns_under_every_kernel() {
+    for kernel in CALIBRATED {
+        passes(kernel, &small(kernel), Check::Turns(40, None));
+    }
+}
+
+fn shipped(name: &str) -> Model {
+    Program::open(name).and_then(Program::compile).unwrap_or_else(|e| panic!("{name}: {e}"))
+}
+
+#[test]
+fn small_shipped_programs() {
+    for name in ["coin.pcad", "geometric.pcad"] {
+        passes(name, &shipped(name), Check::Ranks(60, Some(1500)));
+        passes(name, &shipped(name), Check::Turns(40, Some(500)));
+    }
+}
+
+#[test]
+#[ignore = "minutes"]
+fn every_shipped_program_that_can_be_simulated() {
+    for name in ["coin.pcad", "geometric.pcad", "linreg.pcad", "mixture.pcad", "crp.pcad"] {
+        passes(name, &shipped(name), Check::Ranks(200, None));
+        passes(name, &shipped(name), Check::Turns(100, None));
+    }
+}
+
+/// A sphere somewhere before the camera, compared in some way.
+fn scene(data: &str, observe: &str, given: Value) -> Model {
+    let text = format!(
+        "include \"std/scene.pcad\" as scene; {data};
+         fn ball(r) {{ scene.landmarks(scene.sphere(r, sides = 8), {{ nose: [0, r, 0], l_ankle: [0, -r, 0] }}) }}
+         assume x ~ normal(0, 0.4); assume y ~ normal(0, 0.4); assume r ~ uniform(0.4, 0.9);
+         let view = scene.render(scene.affine(translate = [x, y, 0]) * ball(r));
+         observe {observe};
+         infer {{ warmup 300 {{ drift(one(@**)); drift(@**); }} repeat 60 {{ repeat 5 {{ drift(one(@**)); drift(@**); }} collect x, y, r; }} }}"
+    );
+    let program = Program::parse(&text).unwrap_or_else(|e| panic!("{e}"));
+    program.observe("seen", given).compile().unwrap_or_else(|e| panic!("{e}"))
+}
+
+fn scenes() -> Vec<(&'static str, Model)> {
+    let mask = Value::object(MaskValue::new(Mask::new(16, 16, vec![false; 256]).unwrap()));
+    let mut depths = vec![f32::INFINITY; 256];
+    depths[7] = f32::NAN;
+    let depth = Value::object(DepthValue::new(DepthMap::new(16, 16, depths).unwrap()));
+    let point = |name: &str| Keypoint { name: Arc::from(name), x: 8.0, y: 8.0, confidence: 0.6 };
+    let points = Keypoints::new(["nose", "l_ankle"].map(point).to_vec()).unwrap().in_image(16, 16);
+    let points = Value::object(KeypointsValue(points));
+    let grey = |x: u32, y: u32| image::Rgb([((x * 7 + y * 11) % 4 * 60) as u8; 3]);
+    let photo = Photo::from_rgb(image::RgbImage::from_fn(16, 16, grey)).unwrap();
+    let photo = Value::object(ImageValue::photo(photo));
+    let region = "scene.region(view, power = 1, tile_power = 0, colours = 4, size = 16) = seen";
+    vec![
+        ("keypoints", scene("data seen = keypoints()", "scene.keypoints(view, sd = 10, outlier = 0.3) = seen", points)),
+        ("region", scene("data seen: image", region, photo)),
+        ("mask", scene("data seen = mask()", "scene.mask(view, eps_in = 0.3, eps_out = 0.3, size = 16) = seen", mask)),
+        ("depth", scene("data seen = depth()", "scene.depth(view, sd = 0.5, outlier = 0.4, size = 16) = seen", depth)),
+    ]
+}
+
+#[test]
+fn scenes_with_samplers() {
+    for (name, model) in scenes() {
+        passes(name, &model, Check::Turns(30, Some(200)));
+    }
+}
+
+#[test]
+#[ignore = "minutes"]
+fn scenes_with_samplers_at_length() {
+    for (name, model) in scenes() {
+        passes(name, &model, Check::Ranks(200, None));
+        passes(name, &model, Check::Turns(100, None));
+    }
+}

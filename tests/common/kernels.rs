@@ -1,0 +1,247 @@
+//! Which kernels the tests of kernels run: the tests read these lists, and so does the table of `docs/kernels.md`
+//! (`tests/kernels.rs`). A kernel is added to a proof by adding a line here; a row of the table follows by itself.
+#![allow(dead_code)]
+
+/// A kernel and, every other time, one that reaches everything.
+macro_rules! with_mh {
+    ($k:literal) => {
+        concat!("mix { 0.6 => ", $k, "; 0.4 => mh(one(@**)); }")
+    };
+}
+
+/// Against exact answers (`tests/exact.rs`): statements, or several of them.
+pub mod exact {
+    pub const CONJUGATE: &[&str] = &[
+        "mh(one(@**))",
+        "block(@**)",
+        "drift(@x)",
+        "elliptical(@x)",
+        "hmc(@x, steps = 4)",
+        "mala(@x)",
+        "nuts(@x)",
+        "slice(@x)",
+        "slice(@x, width = 0.3)",
+        "temper(drift(@x), levels = 3)",
+        "mix { 0.3 => mh(@x); 0.3 => drift(@x); 0.4 => elliptical(@x); }",
+    ];
+    pub const BETA_BINOMIAL: &[&str] = &["mh(@p)", "drift(@p)"];
+    pub const DEPENDENT_SUPPORT: &[&str] = &["mh(one(@**))", "block(@**)", "drift(@**)", "drift(one(@**))"];
+    pub const RECURSION: &[&str] = &[
+        "mh(one(@**))",
+        "gibbs(one(@**))",
+        "block(@**)",
+        "drift(one(@**))",
+        "mh(one(@a/geom#2))",
+        "mix { 0.5 => mh(one(@**)); 0.5 => gibbs(each(@**)); }",
+        "temper(mh(one(@**)), levels = 3)",
+    ];
+    pub const BRANCHES: &[&str] = &[
+        "mh(one(@**));",
+        "gibbs(@c); drift(@x);",
+        "block(@**);",
+        "mh(@c); elliptical(one($gaussian));",
+        "temper(mh(one(@**)), levels = 3);",
+    ];
+    pub const HIDDEN_MARKOV: &[&str] =
+        &["gibbs(one(@s))", "mh(one(@s))", "drift(one(@s))", "gibbs(each(@s))", "mh(each(@s))", "drift(each(@s))"];
+    pub const OPEN_UNIVERSE: &[&str] = &[
+        "mh(one($discrete)); drift(one($continuous));",
+        "gibbs(one($discrete)); mh(one($continuous)); mh(one($discrete));",
+    ];
+    pub const ALL: &[&[&str]] =
+        &[CONJUGATE, BETA_BINOMIAL, DEPENDENT_SUPPORT, RECURSION, BRANCHES, HIDDEN_MARKOV, OPEN_UNIVERSE];
+}
+
+/// Reversible, with the right marginal (`tests/balance.rs`).
+pub mod balance {
+    pub const DISCRETE: &[&str] = &[
+        "mh(one(@**))",
+        "block(@**)",
+        "block(one(@**))",
+        "gibbs(one(@**))",
+        "drift(one(@**), 1)",
+        "drift(@**, 1)",
+        with_mh!("gibbs(@a)"),
+        with_mh!("mh(@b)"),
+        with_mh!("drift(@a, 1)"),
+    ];
+    pub const SUPPORT: &[&str] = &[
+        "mh(one(@**))",
+        "block(@**)",
+        "drift(one(@**), 1)",
+        "drift(@**, 0.8)",
+        with_mh!("drift(@p1, 1)"),
+        with_mh!("mh(@p2)"),
+        "hmc(@**, steps = 3)",
+        "mala(@**)",
+        "nuts(@**)",
+        "slice(one(@**))",
+        with_mh!("slice(@p1, width = 2)"),
+    ];
+    pub const FINITE_SUPPORT: &[&str] = &[
+        "mix { 0.5 => mh(one(@**)); 0.5 => block(@**); }",
+        "block(@**)",
+        "mix { 0.5 => drift(@**, 1); 0.5 => block(@**); }",
+        "mix { 0.5 => drift(one(@**), 1); 0.5 => block(@**); }",
+        "mix { 0.5 => gibbs(one(@**)); 0.5 => block(@**); }",
+    ];
+    pub const COUNTS: &[&str] = &[
+        "mh(one(@**))",
+        "block(@**)",
+        "drift(one(@**), 1)",
+        with_mh!("drift(@**, 1)"),
+        "mix { 0.5 => gibbs(@k); 0.5 => drift(@n, 2); }",
+    ];
+    pub const GAUSSIAN: &[&str] = &[
+        "elliptical(@**)",
+        "elliptical(one(@**))",
+        with_mh!("elliptical(@a)"),
+        with_mh!("elliptical(@b)"),
+        "drift(@**, 0.9)",
+        "drift(one(@**), 1.2)",
+        "mh(one(@**))",
+        "block(@**)",
+    ];
+    pub const STRUCTURE: &[&str] = &[
+        "mh(one(@**))",
+        "block(@**)",
+        "block(one(@**))",
+        "drift(one(@**), 0.7)",
+        "drift(@**, 0.7)",
+        with_mh!("gibbs(@c)"),
+        with_mh!("gibbs(one($finite))"),
+        with_mh!("drift($continuous, 0.8)"),
+        with_mh!("hmc($continuous, steps = 3)"),
+        with_mh!("mala($continuous)"),
+        with_mh!("nuts($continuous)"),
+        with_mh!("slice($continuous)"),
+        with_mh!("block(@x/**)"),
+    ];
+    pub const SHARED: &[&str] = &[
+        "mh(one(@**))",
+        "block(@**)",
+        "drift(one(@**), 0.7)",
+        "drift(@**, 0.7)",
+        with_mh!("gibbs(@c)"),
+        with_mh!("drift(@x/a, 0.8)"),
+    ];
+    pub const ELEMENTS: &[&str] = &[
+        "mh(one(@**))",
+        "block(@**)",
+        "drift(one(@**), 0.8)",
+        "drift(@**, 0.6)",
+        "mix { 0.5 => gibbs(@n); 0.5 => drift(@z, 0.7); }",
+        with_mh!("drift(one(@z), 0.7)"),
+    ];
+    pub const SHARED_GROUPS: &[&str] = &[
+        "mh(one(@**))",
+        "block(@**)",
+        "drift(one(@**), 0.8)",
+        with_mh!("drift(@**, 0.6)"),
+        "mix { 0.5 => gibbs(one($finite)); 0.5 => drift($continuous, 0.8); }",
+        "mix { 0.5 => block(one($finite)); 0.5 => mh(one($continuous)); }",
+    ];
+    /// Proposals from neighbours that have nothing to do with the data, and few of them.
+    pub const NEIGHBOURS: &[&str] = &[
+        "knn(@**, bank = \"b\")",
+        "mix { 0.6 => knn(one(@**), bank = \"b\", k = 2); 0.4 => block(@**); }",
+        "mix { 0.6 => knn(@**, bank = \"b\", k = 1); 0.4 => block(@**); }",
+    ];
+    pub const NEIGHBOURS_OF_SOME: &[&str] =
+        &[with_mh!("knn($continuous, bank = \"b\")"), with_mh!("knn(@c, bank = \"b\")")];
+    /// The same choices always.
+    pub const FIXED: &[&[&str]] = &[DISCRETE, SUPPORT, FINITE_SUPPORT, COUNTS, GAUSSIAN, NEIGHBOURS];
+    /// Choices that appear, vanish, change form or are shared.
+    pub const CHANGING: &[&[&str]] = &[STRUCTURE, SHARED, ELEMENTS, SHARED_GROUPS, NEIGHBOURS, NEIGHBOURS_OF_SOME];
+}
+
+/// Parameters and data by turns, data as choices (`tests/balance.rs`); `%` is the selection.
+pub const BY_TURNS: &[&str] = &["mh(one(%))", "block(%)", "drift(%, 0.7)", "drift(one(%), 1)"];
+
+/// Simulation-based calibration and Geweke's test (`tests/calibration.rs`).
+pub const CALIBRATED: &[&str] = &[
+    "mh(one(@**))",
+    "block(@**)",
+    "drift(one(@**))",
+    "mh(@c); drift(@m + @s);",
+    "gibbs(@c); drift(@m); drift(@s);",
+    "gibbs(@c); slice(@s); elliptical(@m);",
+    "mh(@c); hmc($continuous, steps = 5);",
+    "mh(@c); mala($continuous);",
+    "mh(@c); nuts($continuous, max_depth = 5);",
+    "temper(mh(one(@**)), levels = 3);",
+    "gibbs(each($finite)); drift(each($continuous));",
+];
+
+/// Chains that are the same bit for bit with and without incremental updates, on any number of threads (`tests/trace.rs`).
+pub const INCREMENTAL: &str = "mix { 0.3 => mh(one(@**)); 0.2 => gibbs(one($finite)); 0.2 => drift(one(@**)); 0.2 => elliptical(one($gaussian)); 0.1 => block(@**); 0.1 => slice(one($continuous)); }";
+
+/// A column of the table: what it is called, what the test shows, where it is, the statements it runs.
+pub struct Proof {
+    pub name: &'static str,
+    pub shows: &'static str,
+    pub file: &'static str,
+    pub statements: &'static [&'static [&'static str]],
+}
+
+/// The columns.
+pub const PROOFS: &[Proof] = &[
+    Proof {
+        name: "exact answers",
+        shows: "posterior means against conjugate, enumerated or integrated ones, within five standard errors",
+        file: "tests/exact.rs",
+        statements: exact::ALL,
+    },
+    Proof {
+        name: "balance",
+        shows: "counts of moves there and back are symmetric, and the marginal is the posterior",
+        file: "tests/balance.rs",
+        statements: balance::FIXED,
+    },
+    Proof {
+        name: "changing structure",
+        shows: "the same where choices appear, vanish, change form or are shared",
+        file: "tests/balance.rs",
+        statements: balance::CHANGING,
+    },
+    Proof {
+        name: "by turns",
+        shows: "parameters and data, drawn by turns as choices, keep the moments of their joint prior",
+        file: "tests/balance.rs",
+        statements: &[BY_TURNS],
+    },
+    Proof {
+        name: "SBC",
+        shows: "true values have uniform ranks among draws given data simulated from them",
+        file: "tests/calibration.rs",
+        statements: &[CALIBRATED],
+    },
+    Proof {
+        name: "Geweke",
+        shows: "kernel and fresh data by turns keep the joint distribution",
+        file: "tests/calibration.rs",
+        statements: &[CALIBRATED],
+    },
+    Proof {
+        name: "posteriordb",
+        shows: "with the default plan, means and mean squares of six reference posteriors: |z| < 4 at more than 400 effective draws",
+        file: "tests/posteriordb.rs",
+        statements: &[&["nuts($continuous)"]],
+    },
+    Proof {
+        name: "incremental = full",
+        shows: "the same chain, bit for bit, whether updates are incremental or re-run the whole program",
+        file: "tests/trace.rs",
+        statements: &[&[INCREMENTAL]],
+    },
+];
+
+impl Proof {
+    /// Whether a kernel is among the statements.
+    pub fn runs(&self, kernel: &str) -> bool {
+        let call = format!("{kernel}(");
+        let begins = |text: &str, i: usize| !text[..i].ends_with(|c: char| c.is_alphanumeric() || c == '_' || c == '@');
+        let named = |text: &&str| text.match_indices(&call).any(|(i, _)| begins(text, i));
+        self.statements.iter().copied().flatten().any(named)
+    }
+}

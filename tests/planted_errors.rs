@@ -1,0 +1,159 @@
+//! The checks by simulation themselves: right kernels pass, planted errors are found, programs that cannot be simulated are
+//! refused with the reason.
+
+use pcadlang::Model;
+use pcadlang::dist::Datum;
+use pcadlang::infer::calibration::{CalibrationError, KernelSampler, PlanSampler, Settings, geweke, sbc};
+use pcadlang::infer::{At, Kernel, Mh, Outcome, Pick, Progress, RunOptions, Scope};
+use pcadlang::lang::value::Value;
+use pcadlang::rng::Stream;
+use pcadlang::trace::{Change, Selector, Trace, TraceResult};
+
+const GAMMA: &str = "assume s ~ gamma(3, 3); observe poisson(4 * s) = [2, 3] as n;";
+
+fn model(text: &str) -> Model {
+    Model::from_text(text).unwrap_or_else(|e| panic!("{e}"))
+}
+
+/// The test of Metropolis & Hastings.
+fn decide(trace: &mut Trace, log_ratio: f64, rng: &mut Stream) -> Outcome {
+    let accepted = libm::log(rng.open_uniform()) < log_ratio;
+    if accepted {
+        trace.commit()
+    } else {
+        trace.rollback()
+    }
+    Outcome::one(accepted)
+}
+
+/// A step of a random walk of the logarithm, with the term for that or without.
+struct LogWalk {
+    hastings: bool,
+}
+
+impl Kernel for LogWalk {
+    fn name(&self) -> String {
+        "log walk".into()
+    }
+
+    fn step(&mut self, trace: &mut Trace, at: &At) -> TraceResult<Outcome> {
+        let mut rng = at.stream();
+        let all = trace.select(&Selector::All);
+        let target = trace.targets(all)[0];
+        let Value::Num(x) = trace.value(target) else { return Ok(Outcome::default()) };
+        let step = rng.standard_normal();
+        let weight = trace.propose(&[(target, Change::Set(Datum::Num(x * libm::exp(step))))], at.draws(0))?;
+        let hastings = if self.hastings { step } else { 0.0 };
+        Ok(decide(trace, weight.log_weight + hastings, &mut rng))
+    }
+}
+
+/// Prior resimulation that accepts too readily: the ratio at the power of a quarter, as if data said less than they do.
+struct Eager;
+
+impl Kernel for Eager {
+    fn name(&self) -> String {
+        "eager".into()
+    }
+
+    fn step(&mut self, trace: &mut Trace, at: &At) -> TraceResult<Outcome> {
+        let mut rng = at.stream();
+        let all = trace.select(&Selector::All);
+        let target = trace.targets(all)[0];
+        let weight = trace.propose(&[(target, Change::Resample)], at.draws(0))?;
+        Ok(decide(trace, 0.25 * weight.log_weight, &mut rng))
+    }
+}
+
+fn looped(kernel: fn() -> Box<dyn Kernel>, every: u64) -> KernelSampler<fn() -> Box<dyn Kernel>> {
+    KernelSampler { kernel, seed: 5, warmup: 50, every, draws: 40 }
+}
+
+const RIGHT: fn() -> Box<dyn Kernel> = || Box::new(LogWalk { hastings: true });
+const WRONG: fn() -> Box<dyn Kernel> = || Box::new(LogWalk { hastings: false });
+const EAGER: fn() -> Box<dyn Kernel> = || Box::new(Eager);
+const MH: fn() -> Box<dyn Kernel> = || Box::new(Mh::new(Scope { selector: Selector::All, pick: Pick::One }));
+
+fn settings(replicates: usize) -> Settings {
+    Settings { replicates, seed: 11, threads: 2, ..Settings::default() }
+}
+
+#[test]
+fn sbc_tells_right_kernels_from_planted_errors() {
+    let m = model(GAMMA);
+    for (kernel, right) in [(RIGHT, true), (MH, true), (WRONG, false), (EAGER, false)] {
+        let said = sbc(m.code(), &looped(kernel, 12), &Settings { steps: Some(480), ..settings(300) }).unwrap();
+        assert_eq!(said.rows.iter().map(|r| &*r.name).collect::<Vec<_>>(), ["@s", "log joint"]);
+        assert_eq!(said.passes(), right, "{}: {said:?}", kernel().name());
+        assert_eq!(said.rows[0].counts.iter().sum::<u32>(), 300);
+    }
+}
+
+#[test]
+fn geweke_tells_right_kernels_from_planted_errors() {
+    let m = model(GAMMA);
+    for (kernel, right) in [(RIGHT, true), (MH, true), (WRONG, false), (EAGER, false)] {
+        let said = geweke(m.code(), &looped(kernel, 3), &settings(100)).unwrap();
+        assert_eq!(said.rows.len(), 4);
+        assert_eq!(said.passes(), right, "{}: {said:?}", kernel().name());
+    }
+}
+
+/// Structure that comes and goes, discrete choices, arrays: the plan of a program passes both.
+#[test]
+fn plans_with_changing_structure_pass() {
+    let m = model(
+        "assume c ~ flip(0.4);
+         assume x = if c { a ~ categorical([1, 2, 1]); a } else { b ~ gamma(2, 1); d ~ flip(0.3); if d { b } else { b + 1 } };
+         assume v ~ mv_normal([0, 0], [[1, 0.5], [0.5, 1]]);
+         observe normal(x, 1) = [2, 1]; observe normal(v[0] - v[1], 1) = 0; observe flip(0.2 + 0.6 * (if c { 1 } else { 0 })) = true;
+         infer { repeat 80 { repeat 20 { mix { 0.6 => mh(one(@**)); 0.2 => block(@**); 0.2 => elliptical($gaussian); } } } }",
+    );
+    let (plan, _) = m.plan().unwrap();
+    let progress = Progress::default();
+    let sampler =
+        PlanSampler { plan: &plan, options: RunOptions { seed: 2, ..RunOptions::default() }, progress: &progress };
+    let ranks = sbc(m.code(), &sampler, &Settings { steps: Some(1600), ..settings(50) }).unwrap();
+    assert!(ranks.passes() && ranks.rows.iter().any(|r| r.name == "@x/b") && ranks.rows.len() == 7, "{ranks:?}");
+    let joint = geweke(m.code(), &sampler, &settings(40)).unwrap();
+    assert!(joint.passes() && joint.turns == 79, "{joint:?}");
+}
+
+#[test]
+fn results_do_not_depend_on_the_number_of_threads() {
+    let m = model(GAMMA);
+    let on = |threads| {
+        let s = Settings { threads, ..settings(24) };
+        let (a, b) = (sbc(m.code(), &looped(MH, 2), &s).unwrap(), geweke(m.code(), &looped(MH, 2), &s).unwrap());
+        format!("{a:?} {b:?}")
+    };
+    assert_eq!(on(1), on(3));
+}
+
+#[test]
+fn programs_that_are_no_joint_distribution_are_refused_with_the_reason() {
+    for (text, says) in [
+        ("assume x ~ normal(0, 1); factor(-x * x) as soft;", "@soft is a factor"),
+        ("assume x ~ flat(); observe normal(x, 1) = 0;", "the prior of @x is improper"),
+        ("assume x ~ normal(0, 1); freeze @x; observe normal(x, 1) = 0;", "`freeze`"),
+        ("assume x ~ normal(0, 1);", "observes nothing"),
+        (
+            "assume c ~ flip(0.5); assume x ~ normal(0, 1); if c { observe normal(x, 1) = 0 as y; } observe normal(x, 1) = 1;",
+            "there or not",
+        ),
+        ("assume x ~ normal(0, 1); observe normal(0, 1) = x as y;", "what @y observes depends on choices"),
+    ] {
+        let m = model(text);
+        let said = match sbc(m.code(), &looped(MH, 1), &settings(20)) {
+            Err(CalibrationError::NotSimulable(reason)) => reason,
+            other => panic!("{text}: {other:?}"),
+        };
+        assert!(said.contains(says), "{text}: {said}");
+        assert!(matches!(
+            geweke(m.code(), &looped(MH, 1), &settings(20)),
+            Err(CalibrationError::NotSimulable(r)) if r == said
+        ));
+    }
+    let few = sbc(model(GAMMA).code(), &looped(MH, 1), &settings(5));
+    assert!(matches!(few, Err(CalibrationError::TooFew(_))));
+}
