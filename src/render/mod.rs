@@ -9,6 +9,7 @@ mod contours;
 mod frame;
 mod layers;
 mod project;
+mod pull;
 mod raster;
 mod shade;
 mod trace;

@@ -10,7 +10,7 @@
 //! is pulled straight through an ancestor.
 
 use super::pose::Motion;
-use super::real::{M3, Real, Tape, V3, Var};
+use crate::geom::real::{M3, Real, Tape, V3, Var};
 use super::{JointPose, Rig, Rules};
 use crate::geom::GeomError;
 use glam::{DAffine3, DMat3, DVec3};

@@ -1,6 +1,6 @@
 //! Poses: what each joint of a rig does. Plain numbers; how they move a body is the business of `kinematics`.
 
-use super::real::{M3, Real, V3};
+use crate::geom::real::{M3, Real, V3};
 use crate::geom::GeomError;
 use glam::{DMat3, DVec3};
 

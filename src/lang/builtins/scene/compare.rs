@@ -1,8 +1,10 @@
 //! Likelihoods of what is observed given a view.
 
+use super::adjoints::BySolid;
 use super::observed::{DepthValue, ImageValue, MaskValue};
 use super::{VIEW, ViewValue, native};
-use crate::lang::builtins::{Arg, Args, Builtin, Type, arg, opt};
+use crate::lang::adjoint::Adjoint;
+use crate::lang::builtins::{Arg, Args, Builtin, Pulled, Type, arg, opt};
 use crate::lang::error::Fault;
 use crate::lang::value::{Likelihood, Value};
 use crate::render::{Contours, View};
@@ -36,7 +38,8 @@ pub(super) const TABLE: &[Builtin] = &[
         Type::Likelihood,
         "The likelihood ratio of the observed contours: the object against clutter. The default for photographs.",
         contour,
-    ),
+    )
+    .pull(|_, _, by| Some(by_view(by.clone(), 6))),
     native(
         "chamfer",
         SECTION,
@@ -58,7 +61,12 @@ pub(super) const TABLE: &[Builtin] = &[
         Type::Likelihood,
         "The probabilistic chamfer distance of Kulkarni et al. 2014, section 2(c): no density over photographs.",
         chamfer,
-    ),
+    )
+    .pull(|_, _, by| {
+        let mut pulled = by_view(by.element(0), 6);
+        pulled[1] = by.element(1);
+        Some(pulled)
+    }),
     native(
         "mask",
         SECTION,
@@ -139,6 +147,16 @@ fn chamfer(a: &Args) -> Result<Value, Fault> {
     likelihood(ChamferOf { view: view(a)?, size: size(a, 6)?, options })
 }
 
+/// The adjoints of a likelihood's arguments: by the view as given, by so many others unknown.
+pub(super) fn by_view(by: Adjoint, others: usize) -> Pulled {
+    std::iter::once(by).chain((0..others).map(|_| Adjoint::Unknown)).collect()
+}
+
+/// By the view, from derivatives by the pieces of its contours.
+fn by_contours(view: &View, size: u32, by_piece: &[[f64; 4]]) -> Adjoint {
+    BySolid { landmarks: Vec::new(), vertices: view.pull_contours(size, by_piece) }.into_adjoint()
+}
+
 fn elements(c: &Contours) -> Elements<'_> {
     Elements { x: &c.x, y: &c.y, tx: &c.tx, ty: &c.ty, length: &c.length, width: c.width, height: c.height }
 }
@@ -175,19 +193,35 @@ struct ContourOf {
     options: ContourRatioOptions,
 }
 
-impl Likelihood for ContourOf {
-    fn name(&self) -> &'static str {
-        "scene.contour"
-    }
-
-    fn log_density(&self, observed: &Value) -> Result<f64, String> {
+impl ContourOf {
+    /// The comparator for what was observed, and the contours it compares.
+    fn prepared(&self, observed: &Value) -> Result<(Arc<ContourRatio>, Arc<Contours>), String> {
         let image = image(observed, &self.view, self.name())?;
         let contours = self.view.contours(self.size);
         let key = (self.options.clone(), contours.width, contours.height);
         let ratio = image.ratios.get(key, |(options, w, h)| {
             ContourRatio::prepare(image.map(), *w, *h, options).map_err(|e| format!("scene.contour: {e}"))
         })?;
+        Ok((ratio, contours))
+    }
+}
+
+impl Likelihood for ContourOf {
+    fn name(&self) -> &'static str {
+        "scene.contour"
+    }
+
+    fn log_density(&self, observed: &Value) -> Result<f64, String> {
+        let (ratio, contours) = self.prepared(observed)?;
         Ok(RATIO.with_borrow_mut(|scratch| ratio.log_likelihood_with(&elements(&contours), scratch)))
+    }
+
+    /// By the view.
+    fn gradient(&self, observed: &Value) -> Option<Adjoint> {
+        let (ratio, contours) = self.prepared(observed).ok()?;
+        let mut by_piece = Vec::new();
+        RATIO.with_borrow_mut(|scratch| ratio.gradient(&elements(&contours), scratch, &mut by_piece));
+        Some(by_contours(&self.view, self.size, &by_piece))
     }
 
     fn is_proper(&self) -> bool {
@@ -202,19 +236,36 @@ struct ChamferOf {
     options: ChamferOptions,
 }
 
-impl Likelihood for ChamferOf {
-    fn name(&self) -> &'static str {
-        "scene.chamfer"
-    }
-
-    fn log_density(&self, observed: &Value) -> Result<f64, String> {
+impl ChamferOf {
+    /// The comparator for what was observed, and the contours it compares.
+    fn prepared(&self, observed: &Value) -> Result<(Arc<Chamfer>, Arc<Contours>), String> {
         let image = image(observed, &self.view, self.name())?;
         let contours = self.view.contours(self.size);
         let key = (self.options.clone(), contours.width, contours.height);
         let chamfer = image.chamfers.get(key, |(options, w, h)| {
             Chamfer::prepare(image.map(), *w, *h, options).map_err(|e| format!("scene.chamfer: {e}"))
         })?;
+        Ok((chamfer, contours))
+    }
+}
+
+impl Likelihood for ChamferOf {
+    fn name(&self) -> &'static str {
+        "scene.chamfer"
+    }
+
+    fn log_density(&self, observed: &Value) -> Result<f64, String> {
+        let (chamfer, contours) = self.prepared(observed)?;
         Ok(CHAMFER.with_borrow_mut(|scratch| chamfer.log_likelihood_with(&elements(&contours), scratch)))
+    }
+
+    /// By the view and by sigma.
+    fn gradient(&self, observed: &Value) -> Option<Adjoint> {
+        let (chamfer, contours) = self.prepared(observed).ok()?;
+        let mut by_piece = Vec::new();
+        let by_sigma =
+            CHAMFER.with_borrow_mut(|scratch| chamfer.gradient(&elements(&contours), scratch, &mut by_piece));
+        Some(Adjoint::List(vec![by_contours(&self.view, self.size, &by_piece), Adjoint::Num(by_sigma)]))
     }
 
     fn is_proper(&self) -> bool {

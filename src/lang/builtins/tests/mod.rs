@@ -1,5 +1,6 @@
 //! Tests of the built-ins through the table, as a program calls them.
 
+mod gradients;
 mod lists;
 mod maths;
 mod operators;
