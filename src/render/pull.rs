@@ -121,9 +121,10 @@ mod tests {
         parallel.projection = crate::render::Projection::Orthographic { units_per_pixel: 0.04, cx: 47.0, cy: 41.0 };
         for camera in [Camera::default_for(96, 80), parallel] {
             let contours = Contours::of(&group, &camera);
-            let mut rng = Uniform::new(3);
-            let by: Vec<[f64; 4]> =
-                (0..contours.len()).map(|_| std::array::from_fn(|_| rng.next() - 0.5)).collect();
+            let mut rng = Uniform(3);
+            // Angles count by length: those of short pieces turn fast.
+            let one = |length: &f32| [1.0, 1.0, 1.0, f64::from(*length)].map(|by| by * (rng.next() - 0.5));
+            let by: Vec<[f64; 4]> = contours.length.iter().map(one).collect();
             let found = contours.pull(&group, &camera, &by);
             let mut origins = Vec::new();
             contours.origins(&group, &camera, |i, _, base, o| origins.push((i, base, *o)));
