@@ -152,7 +152,9 @@ fn quartiles(mut all: Vec<f64>) -> [f64; 3] {
 fn main() -> Result<()> {
     let poses: u64 = std::env::args().nth(1).and_then(|a| a.parse().ok()).unwrap_or(200);
     let likelihood = std::env::args().nth(2).unwrap_or(format!("scene.chamfer(view, sigma = 1, size = {SIZE})"));
-    println!("{likelihood}: cosine with differences of half a pixel (quartiles), cost of a gradient in evaluations of the score");
+    println!(
+        "{likelihood}: cosine with differences of half a pixel (quartiles), cost of a gradient in evaluations of the score"
+    );
     for (name, scene) in [("lathe", LATHE), ("body", BODY)] {
         let blank = compile(scene, &likelihood, ContourMap::new(SIZE, SIZE))?;
         let (mut cosines, mut scores, mut gradients, mut coordinates) = (Vec::new(), Vec::new(), Vec::new(), 0);

@@ -39,7 +39,7 @@ impl fmt::Debug for Solid {
 }
 
 /// The derivatives of something by what a placed solid is made from.
-#[derive(Clone, Debug, Default, PartialEq)]
+#[derive(Clone, Debug, PartialEq)]
 pub struct PlacedGradient {
     /// By the placement's linear part.
     pub linear: DMat3,
@@ -149,15 +149,15 @@ impl Solid {
     /// The vector-Jacobian product of [`Solid::placed`]: from the derivatives of something by the vertices and landmarks of the
     /// placed solid, in world coordinates. No vertices: nothing depends on them.
     pub fn pull_placed(&self, by: Affine, by_vertex: &[DVec3], by_landmark: &[DVec3]) -> PlacedGradient {
-        let mut g = PlacedGradient::default();
+        let (mut linear, mut shift) = (DMat3::ZERO, DVec3::ZERO);
         let back = by.0.matrix3.transpose();
         let mut pull = |p: DVec3, by: &DVec3| {
             // Most vertices make no contour.
             if *by == DVec3::ZERO {
                 return DVec3::ZERO;
             }
-            g.linear += outer(*by, p);
-            g.shift += *by;
+            linear += outer(*by, p);
+            shift += *by;
             back * *by
         };
         let vertices = if by_vertex.is_empty() {
@@ -166,7 +166,7 @@ impl Solid {
             self.vertices().zip(by_vertex).map(|(p, by)| pull(p, by)).collect()
         };
         let landmarks = self.landmarks.iter().zip(by_landmark).map(|(l, by)| pull(l.position, by)).collect();
-        PlacedGradient { vertices, landmarks, ..g }
+        PlacedGradient { linear, shift, vertices, landmarks }
     }
 
     /// The vector-Jacobian product of [`Solid::centred`], like that of [`Solid::pull_placed`]: by vertices and landmarks.

@@ -63,9 +63,8 @@ fn pull_piece(
 ) {
     let corners = origin.corners.map(|v| instance.mesh.positions.get(v as usize));
     let [Some(p), Some(q), Some(r)] = corners else { return };
-    let ends = origin.ends.map(|[a, b, c]| {
-        instance.affine.point(p.as_dvec3() * a + q.as_dvec3() * b + r.as_dvec3() * c)
-    });
+    let ends =
+        origin.ends.map(|[a, b, c]| instance.affine.point(p.as_dvec3() * a + q.as_dvec3() * b + r.as_dvec3() * c));
     let [(ax, ay, a_depth), (bx, by, b_depth)] = ends.map(|e| camera.project(e));
     let (dx, dy) = (bx - ax, by - ay);
     let length = (dx * dx + dy * dy).sqrt();

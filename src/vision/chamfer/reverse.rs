@@ -119,7 +119,13 @@ impl Reverse {
     /// Calls `f(length, distance, pair)` for every observed point, in a fixed order, both in pixels, with the point and the
     /// piece it is measured to. `turn` is the cost in pixels of one channel's turn. An element partly in view costs up to a diagonal more, so that none appears suddenly. With nothing
     /// in view distances are infinite.
-    pub fn each(&self, elements: &Elements<'_>, turn: f32, scratch: &mut Scratch, mut f: impl FnMut(f32, f32, Option<[&Piece; 2]>)) {
+    pub fn each(
+        &self,
+        elements: &Elements<'_>,
+        turn: f32,
+        scratch: &mut Scratch,
+        mut f: impl FnMut(f32, f32, Option<[&Piece; 2]>),
+    ) {
         let Scratch { pieces, sorted, start, filled, near } = scratch;
         let diagonal = elements.diagonal() as f32;
         pieces.clear();

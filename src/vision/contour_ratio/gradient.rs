@@ -16,8 +16,7 @@ impl ContourRatio {
         self.log_likelihood_with(elements, scratch);
         let samples = self.grid.width as usize * self.grid.height as usize;
         let factor = self.options.weight / self.options.unit;
-        let length: f64 =
-            elements.in_view().map(|e| (f64::from(e.length * e.weight) * self.percent).min(1e4)).sum();
+        let length: f64 = elements.in_view().map(|e| (f64::from(e.length * e.weight) * self.percent).min(1e4)).sum();
         // With too little in view, each unit of length takes away some of the penalty.
         let missing = if length < self.options.least {
             -self.options.nothing * libm::log(1.0 - self.options.foreground) / self.options.least

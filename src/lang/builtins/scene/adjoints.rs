@@ -79,9 +79,9 @@ pub(super) fn shaped(v: &Value, g: DVec3) -> Adjoint {
     match v {
         Value::Unit => Adjoint::Zero,
         Value::Num(_) => Adjoint::Num(g.element_sum()),
-        Value::Record(_) => {
-            Adjoint::Record(["x", "y", "z"].into_iter().zip(g.to_array()).map(|(k, g)| (k.into(), Adjoint::Num(g))).collect())
-        }
+        Value::Record(_) => Adjoint::Record(
+            ["x", "y", "z"].into_iter().zip(g.to_array()).map(|(k, g)| (k.into(), Adjoint::Num(g))).collect(),
+        ),
         _ => Adjoint::Array(g.to_array().to_vec()),
     }
 }

@@ -1,8 +1,8 @@
 //! Scene values as objects of the language.
 
+use super::adjoints::BySolid;
 use crate::geom::armature::Armature;
 use crate::geom::{Affine, Solid, outer};
-use super::adjoints::BySolid;
 use crate::lang::adjoint::Adjoint;
 use crate::lang::index::xyz;
 use crate::lang::value::{Object, Value};
