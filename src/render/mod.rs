@@ -8,6 +8,7 @@ mod camera_json;
 mod contours;
 mod frame;
 mod layers;
+mod outline;
 mod project;
 mod pull;
 mod raster;

@@ -7,7 +7,7 @@ use crate::lang::adjoint::Adjoint;
 use crate::lang::builtins::{Arg, Args, Builtin, Pulled, Type, arg, opt};
 use crate::lang::error::Fault;
 use crate::lang::value::{Likelihood, Value};
-use crate::render::{Contours, View};
+use crate::render::{Contours, Frame, View};
 use crate::vision::chamfer::{self, Mode};
 use crate::vision::contour_ratio;
 use crate::vision::{
@@ -82,7 +82,8 @@ pub(super) const TABLE: &[Builtin] = &[
             let (eps_in, eps_out) = (a.num_or(1, 0.05)?, a.num_or(2, 0.05)?);
             likelihood(MaskOf { view: view(a)?, size: size(a, 3)?, eps: [eps_in, eps_out] })
         },
-    ),
+    )
+    .pull(|_, _, by| Some(by_view(by.clone(), 3))),
     native(
         "depth",
         SECTION,
@@ -155,6 +156,11 @@ pub(super) fn by_view(by: Adjoint, others: usize) -> Pulled {
 /// By the view, from derivatives by the pieces of its contours.
 fn by_contours(view: &View, size: u32, by_piece: &[[f64; 4]]) -> Adjoint {
     BySolid { landmarks: Vec::new(), vertices: view.pull_contours(size, by_piece) }.into_adjoint()
+}
+
+/// By the view, from what each pixel brings that the object covers.
+pub(super) fn by_silhouette(view: &View, size: u32, gains: &[f64]) -> Adjoint {
+    BySolid { landmarks: Vec::new(), vertices: view.pull_mask(size, gains) }.into_adjoint()
 }
 
 fn elements(c: &Contours) -> Elements<'_> {
@@ -280,22 +286,36 @@ struct MaskOf {
     eps: [f64; 2],
 }
 
+impl MaskOf {
+    /// The comparator for what was observed, and the frame it compares.
+    fn prepared(&self, observed: &Value) -> Result<(Arc<MaskLikelihood>, Arc<Frame>), String> {
+        let Some(mask) = observed.downcast::<MaskValue>() else {
+            return Err(format!("scene.mask: the observed value must be a mask, got {}", observed.type_name()));
+        };
+        same_shape((mask.mask.width(), mask.mask.height()), &self.view, "scene.mask")?;
+        let frame = self.view.frame(self.size);
+        let prepared = mask.prepared.get((self.eps, frame.width, frame.height), |([i, o], w, h)| {
+            MaskLikelihood::new(&mask.mask, *i, *o).map(|l| l.resized(*w, *h)).map_err(|e| format!("scene.mask: {e}"))
+        })?;
+        Ok((prepared, frame))
+    }
+}
+
 impl Likelihood for MaskOf {
     fn name(&self) -> &'static str {
         "scene.mask"
     }
 
     fn log_density(&self, observed: &Value) -> Result<f64, String> {
-        let Some(mask) = observed.downcast::<MaskValue>() else {
-            return Err(format!("scene.mask: the observed value must be a mask, got {}", observed.type_name()));
-        };
-        same_shape((mask.mask.width(), mask.mask.height()), &self.view, self.name())?;
-        let frame = self.view.frame(self.size);
-        let prepared = mask.prepared.get((self.eps, frame.width, frame.height), |([i, o], w, h)| {
-            MaskLikelihood::new(&mask.mask, *i, *o).map(|l| l.resized(*w, *h)).map_err(|e| format!("scene.mask: {e}"))
-        })?;
+        let (prepared, frame) = self.prepared(observed)?;
         let rendered: Vec<bool> = frame.mask().collect();
         prepared.log_likelihood(&rendered, frame.width, frame.height).map_err(|e| format!("scene.mask: {e}"))
+    }
+
+    /// By the view.
+    fn gradient(&self, observed: &Value) -> Option<Adjoint> {
+        let (prepared, _) = self.prepared(observed).ok()?;
+        Some(by_silhouette(&self.view, self.size, &prepared.gains()))
     }
 }
 

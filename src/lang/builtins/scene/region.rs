@@ -1,12 +1,13 @@
 //! The likelihood of a photograph's colours given a view: `scene.region`. The arithmetic is in [`crate::vision::region`]; here the
 //! drawn frame becomes a group for each pixel.
 
-use super::compare::{SECTION, SEEN, SIZE, image, likelihood, size, view};
+use super::compare::{SECTION, SEEN, SIZE, by_silhouette, by_view, image, likelihood, size, view};
 use super::native;
+use crate::lang::adjoint::Adjoint;
 use crate::lang::builtins::{Args, Builtin, Type, opt};
 use crate::lang::error::Fault;
 use crate::lang::value::{Likelihood, Value};
-use crate::render::View;
+use crate::render::{Frame, View};
 use crate::vision::region::Scratch;
 use crate::vision::{Region, RegionOptions};
 use std::cell::RefCell;
@@ -41,7 +42,8 @@ pub(super) const TABLE: &[Builtin] = &[native(
     Type::Likelihood,
     "The likelihood ratio of the photograph's colours: inside and outside told apart, against one background. A probability of pictures in few colours only with a power of 1 for one term, 0 for the others.",
     region,
-)];
+)
+.pull(|_, _, by| Some(by_view(by.clone(), 7)))];
 
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
 enum Groups {
@@ -79,22 +81,34 @@ thread_local! {
     static SCRATCH: RefCell<(Vec<u8>, Scratch)> = RefCell::default();
 }
 
+impl RegionOf {
+    /// Whether only the silhouette counts.
+    fn outline(&self) -> bool {
+        self.groups == Groups::Silhouette && self.options.shading == 0.0
+    }
+
+    /// The comparator for what was observed, and the frame it compares.
+    fn prepared(&self, observed: &Value) -> Result<(Arc<Region>, Arc<Frame>), String> {
+        let image = image(observed, &self.view, "scene.region")?;
+        let Some(photo) = image.as_photo() else {
+            return Err("scene.region: colours need a photograph, and only a contour map was observed".into());
+        };
+        let frame = if self.outline() { self.view.depth(self.size) } else { self.view.frame(self.size) };
+        let key = (self.options.clone(), frame.width, frame.height);
+        let region = image.regions.get(key, |(options, w, h)| {
+            Region::prepare(photo, *w, *h, options).map_err(|e| format!("scene.region: {e}"))
+        })?;
+        Ok((region, frame))
+    }
+}
+
 impl Likelihood for RegionOf {
     fn name(&self) -> &'static str {
         "scene.region"
     }
 
     fn log_density(&self, observed: &Value) -> Result<f64, String> {
-        let image = image(observed, &self.view, self.name())?;
-        let Some(photo) = image.as_photo() else {
-            return Err("scene.region: colours need a photograph, and only a contour map was observed".into());
-        };
-        let outline = self.groups == Groups::Silhouette && self.options.shading == 0.0;
-        let frame = if outline { self.view.depth(self.size) } else { self.view.frame(self.size) };
-        let key = (self.options.clone(), frame.width, frame.height);
-        let region = image.regions.get(key, |(options, w, h)| {
-            Region::prepare(photo, *w, *h, options).map_err(|e| format!("scene.region: {e}"))
-        })?;
+        let (region, frame) = self.prepared(observed)?;
         Ok(SCRATCH.with_borrow_mut(|(groups, scratch)| {
             groups.clear();
             match self.groups {
@@ -103,6 +117,13 @@ impl Likelihood for RegionOf {
             }
             region.log_likelihood_with(groups, &frame.normal, scratch)
         }))
+    }
+
+    /// By the view, where only the silhouette counts.
+    fn gradient(&self, observed: &Value) -> Option<Adjoint> {
+        let (region, frame) = self.prepared(observed).ok().filter(|_| self.outline())?;
+        let groups: Vec<u8> = frame.mask().map(u8::from).collect();
+        Some(by_silhouette(&self.view, self.size, &region.gains(&groups)))
     }
 
     fn is_proper(&self) -> bool {

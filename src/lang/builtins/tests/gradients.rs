@@ -14,11 +14,9 @@ const NONE: &[(&str, &str)] = &[
     ("scene.autorig", "joints are found by search"),
     ("scene.camera", "cameras are not differentiated"),
     ("scene.depth", "pictures of depth are not differentiated"),
-    ("scene.mask", "pixels are inside or outside"),
-    ("scene.region", "pixels are inside or outside"),
 ];
 
-/// Functions compared with differences elsewhere: `tests/gradient.rs`.
+/// Functions compared with differences elsewhere: in `tests/gradient.rs`, and beside the comparators and renderers.
 const ELSEWHERE: &[&str] = &[
     "sq_exp",
     "matern32",
@@ -29,6 +27,8 @@ const ELSEWHERE: &[&str] = &[
     "scene.keypoints",
     "scene.chamfer",
     "scene.contour",
+    "scene.mask",
+    "scene.region",
 ];
 
 /// An expression.
