@@ -351,7 +351,7 @@ fn pictures_pull_where_their_score_rises() {
             "include \"std/scene.pcad\" as scene; data photo: image;
              assume x ~ uniform(-1, 1); assume y ~ uniform(-1, 1); assume t ~ uniform(-3, 3); assume r ~ uniform(0, 2);
              assume s ~ uniform(0, 20);
-             let vase = scene.lathe({{ y: [-r, -0.2, 0.5, r], r: [0.3, r, 0.6 * r, 0.4] }});
+             let vase = scene.lathe({{ y: [-r, -0.2 * r, 0.5 * r, r], r: [0.3, r, 0.6 * r, 0.4] }});
              let solid = scene.centred(scene.group([vase, scene.affine(translate = [0, 2 * r, 0]) * scene.sphere(0.2)]));
              let view = scene.render(scene.affine(translate = [x, y, 0], rotate = [t, 0.2, 0.4]) * solid);
              observe {likelihood} = photo as picture;"
