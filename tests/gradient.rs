@@ -3,12 +3,12 @@
 
 use pcadlang::Program;
 use pcadlang::dist::Datum;
-use pcadlang::lang::builtins::scene::ImageValue;
+use pcadlang::lang::builtins::scene::{DepthValue, ImageValue, MaskValue};
 use pcadlang::lang::value::Value;
 use pcadlang::render::Camera;
 use pcadlang::rng::{Purpose, StreamKey};
 use pcadlang::trace::{Change, Draws, Selector, Target, Trace};
-use pcadlang::vision::ContourMap;
+use pcadlang::vision::{ContourMap, DepthMap, Mask, Photo};
 
 fn draws() -> Draws {
     Draws { key: StreamKey::new(9, 0, Purpose::VALUES), step: 0, lane: 0 }
@@ -338,17 +338,50 @@ fn disc() -> ImageValue {
     ImageValue::contours(map, None)
 }
 
+/// Whether a pixel of 256 lies in the disc.
+fn inside(i: u32) -> bool {
+    let (x, y) = (f64::from(i % 256) + 0.5, f64::from(i / 256) + 0.5);
+    (x / 4.0 - 34.0).hypot(y / 4.0 - 30.0) < 15.0
+}
+
+fn mask() -> Value {
+    let mask = Mask::new(256, 256, (0..256 * 256).map(inside).collect()).unwrap();
+    Value::object(MaskValue::new(mask))
+}
+
+fn depth() -> Value {
+    let depth = (0..256 * 256).map(|i| if inside(i) { 7.0 + i as f32 * 1e-5 } else { f32::INFINITY }).collect();
+    Value::object(DepthValue::new(DepthMap::new(256, 256, depth).unwrap()))
+}
+
+fn photo() -> Value {
+    let colour = |x: u32, y: u32| {
+        let noise = (x * 7919 + y * 104_729 + x * y) % 97;
+        let base = if inside(y * 256 + x) { [150, 60, 50] } else { [70, 110, 140] };
+        image::Rgb(base.map(|b: u32| (b + noise) as u8))
+    };
+    Value::object(ImageValue::photo(Photo::from_rgb(image::RgbImage::from_fn(256, 256, colour)).unwrap()))
+}
+
 #[test]
 fn pictures_pull_where_their_score_rises() {
     // Differences over half a pixel: sums over pieces and pixels change by small steps.
     let half = 0.5 * 4.4 / 64.0;
-    for likelihood in [
-        "scene.chamfer(view, sigma = s, size = 64)",
-        "scene.chamfer(view, sigma = s, size = 64, mode = \"sum\", symmetric = true)",
-        "scene.contour(view, size = 64, sd = 2, truncate = 9)",
+    for (likelihood, seen) in [
+        ("scene.chamfer(view, sigma = s, size = 64)", Value::object(disc())),
+        ("scene.chamfer(view, sigma = s, size = 64, mode = \"sum\", symmetric = true)", Value::object(disc())),
+        ("scene.contour(view, size = 64, sd = 2, truncate = 9)", Value::object(disc())),
+        ("scene.mask(view, size = 256)", mask()),
+        ("scene.depth(view, size = 256, sd = 0.5)", depth()),
+        ("scene.region(view, size = 256)", photo()),
     ] {
+        let kind = match likelihood {
+            l if l.starts_with("scene.mask") => "mask",
+            l if l.starts_with("scene.depth") => "depth",
+            _ => "image",
+        };
         let text = format!(
-            "include \"std/scene.pcad\" as scene; data photo: image;
+            "include \"std/scene.pcad\" as scene; data photo: {kind};
              assume x ~ uniform(-1, 1); assume y ~ uniform(-1, 1); assume t ~ uniform(-3, 3); assume r ~ uniform(0, 2);
              assume s ~ uniform(0, 20);
              let vase = scene.lathe({{ y: [-r, -0.2 * r, 0.5 * r, r], r: [0.3, r, 0.6 * r, 0.4] }});
@@ -356,7 +389,7 @@ fn pictures_pull_where_their_score_rises() {
              let view = scene.render(scene.affine(translate = [x, y, 0], rotate = [t, 0.2, 0.4]) * solid);
              observe {likelihood} = photo as picture;"
         );
-        let program = Program::parse(&text).unwrap().observe("photo", Value::object(disc()));
+        let program = Program::parse(&text).unwrap().observe("photo", seen);
         let model = program.camera(Camera::default_for(64, 64)).compile().unwrap_or_else(|e| panic!("{e}"));
         let mut trace = model.simulate(1, 0).unwrap();
         let at = |trace: &mut Trace, values: &[(&str, f64)]| {

@@ -13,6 +13,7 @@ mod project;
 mod pull;
 mod raster;
 mod shade;
+mod surface;
 mod trace;
 mod view;
 mod visibility;

@@ -101,7 +101,8 @@ pub(super) const TABLE: &[Builtin] = &[
             let options = [a.positive_or(1, 0.05)?, a.num_or(2, 0.05)?, a.num_or(3, 0.0)?, a.num_or(4, 100.0)?];
             likelihood(DepthOf { view: view(a)?, size: size(a, 5)?, options })
         },
-    ),
+    )
+    .pull(|_, _, by| Some(by_view(by.clone(), 5))),
 ];
 
 pub(super) fn likelihood(l: impl Likelihood + 'static) -> Result<Value, Fault> {
@@ -326,22 +327,39 @@ struct DepthOf {
     options: [f64; 4],
 }
 
-impl Likelihood for DepthOf {
-    fn name(&self) -> &'static str {
-        "scene.depth"
-    }
-
-    fn log_density(&self, observed: &Value) -> Result<f64, String> {
+impl DepthOf {
+    /// The comparator for what was observed, and the frame it compares.
+    fn prepared(&self, observed: &Value) -> Result<(Arc<DepthLikelihood>, Arc<Frame>), String> {
         let Some(depth) = observed.downcast::<DepthValue>() else {
             return Err(format!("scene.depth: the observed value must be a depth map, got {}", observed.type_name()));
         };
-        same_shape((depth.depth.width(), depth.depth.height()), &self.view, self.name())?;
+        same_shape((depth.depth.width(), depth.depth.height()), &self.view, "scene.depth")?;
         let frame = self.view.frame(self.size);
         let prepared =
             depth.prepared.get((self.options, frame.width, frame.height), |([sd, outlier, near, far], w, h)| {
                 let whole = DepthLikelihood::new(&depth.depth, *sd, *outlier, (*near, *far));
                 whole.map(|l| l.resized(*w, *h)).map_err(|e| format!("scene.depth: {e}"))
             })?;
+        Ok((prepared, frame))
+    }
+}
+
+impl Likelihood for DepthOf {
+    fn name(&self) -> &'static str {
+        "scene.depth"
+    }
+
+    fn log_density(&self, observed: &Value) -> Result<f64, String> {
+        let (prepared, frame) = self.prepared(observed)?;
         prepared.log_likelihood(&frame.depth, frame.width, frame.height).map_err(|e| format!("scene.depth: {e}"))
+    }
+
+    /// By the view.
+    fn gradient(&self, observed: &Value) -> Option<Adjoint> {
+        let (prepared, frame) = self.prepared(observed).ok()?;
+        let mut vertices = self.view.pull_depth(self.size, &prepared.slopes(&frame.depth));
+        let outline = self.view.pull_mask(self.size, &prepared.gains(&frame.depth));
+        vertices.iter_mut().zip(outline).for_each(|(v, o)| *v += o);
+        Some(BySolid { landmarks: Vec::new(), vertices }.into_adjoint())
     }
 }

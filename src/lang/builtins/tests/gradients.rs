@@ -13,7 +13,6 @@ use std::collections::HashSet;
 const NONE: &[(&str, &str)] = &[
     ("scene.autorig", "joints are found by search"),
     ("scene.camera", "cameras are not differentiated"),
-    ("scene.depth", "pictures of depth are not differentiated"),
 ];
 
 /// Functions compared with differences elsewhere: in `tests/gradient.rs`, and beside the comparators and renderers.
@@ -27,6 +26,7 @@ const ELSEWHERE: &[&str] = &[
     "scene.keypoints",
     "scene.chamfer",
     "scene.contour",
+    "scene.depth",
     "scene.mask",
     "scene.region",
 ];
