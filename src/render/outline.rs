@@ -1,7 +1,8 @@
 //! How a silhouette moves with the surface: sums over the pixels that a solid covers, by its vertices.
 //!
 //! Where the outline moves outward it takes in what lies beside it, as much as its length times its motion. Pixels are in or
-//! out, so this is the slope of a sum whose steps are evened out, not of the steps.
+//! out, so this is the slope of a sum whose steps are evened out, not of the steps. The outline is taken from the contours: where a
+//! coarse mesh reaches pixels beyond its smooth silhouette, that piece of it is missed.
 
 use super::{Contours, View};
 use glam::DVec3;
@@ -93,10 +94,11 @@ mod tests {
                     p
                 };
                 let way = vertices(&moved(1e-6)).into_iter().zip(vertices(&moved(-1e-6))).map(|(a, b)| (a - b) / 2e-6);
-                let along: f64 = found.iter().zip(way).map(|(g, d)| g.dot(d)).sum();
+                let terms: Vec<f64> = found.iter().zip(way).map(|(g, d)| g.dot(d)).collect();
+                let (along, gross) = (terms.iter().sum::<f64>(), terms.iter().map(|t| t.abs()).sum::<f64>());
                 let slope = (sum(&moved(0.04)) - sum(&moved(-0.04))) / 0.08;
-                // Turning a sphere changes nothing.
-                assert!((along - slope).abs() < 0.03 * slope.abs() + 60.0, "number {k}: {along} {slope}");
+                // What is gained on one side is mostly lost on the other; pixels are in or out.
+                assert!((along - slope).abs() < 0.03 * gross, "number {k}: {along} {slope} of {gross}");
             }
         }
     }

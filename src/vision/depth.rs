@@ -169,7 +169,9 @@ impl DepthLikelihood {
         let gain = |(i, o): (usize, &f32)| {
             let beside = [i.checked_sub(1), Some(i + 1), i.checked_sub(width), Some(i + width)];
             let r = depth(i).or_else(|| beside.into_iter().flatten().find_map(depth));
-            r.map_or(0.0, |r| self.log_density(f64::from(*o), f64::from(r)) - self.log_density(f64::from(*o), f64::INFINITY))
+            r.map_or(0.0, |r| {
+                self.log_density(f64::from(*o), f64::from(r)) - self.log_density(f64::from(*o), f64::INFINITY)
+            })
         };
         self.observed.data.iter().enumerate().map(gain).collect()
     }
