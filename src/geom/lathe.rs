@@ -143,7 +143,7 @@ fn layout<T: Real>(
         } else {
             thickness.constant(f64::NEG_INFINITY)
         };
-        let (walls, start, end) = inner_wall(&strips, last, thickness, down_to, &tolerance, inner);
+        let (walls, [start, end]) = inner_wall(&strips, last, thickness, down_to, &tolerance, inner);
         after.push(Strip { points: vec![last, start], parts: vec![rim], blend: false });
         after.extend(walls);
         if closed_bottom {

@@ -157,7 +157,7 @@ pub(super) fn inner_wall<T: Real>(
     down_to: T,
     tolerance: &Tolerance,
     part: u16,
-) -> (Vec<Strip<T>>, (T, T), (T, T)) {
+) -> (Vec<Strip<T>>, [(T, T); 2]) {
     let bore = |r: T| {
         let (thin, least) = (r - thickness, r * r.constant(LEAST_BORE));
         if thin.value() > least.value() { thin } else { least }
@@ -188,5 +188,5 @@ pub(super) fn inner_wall<T: Real>(
             walls.push(Strip { parts: vec![part; points.len() - 1], points, blend: false });
         }
     }
-    (walls, start, at)
+    (walls, [start, at])
 }

@@ -88,13 +88,13 @@ pub(super) fn stretched(a: &Args, _: &Value, by: &Adjoint) -> Option<Pulled> {
     let Value::Record(factors) = a.get(1) else { return None };
     let list = stretches(a, body).ok()?;
     let (by_factor, rest) = body.pull_stretched(&list, &by_armature(by, body)).ok()?;
-    let one = |(((name, v), (_, stretch)), g): (((&Arc<str>, &Value), &(usize, Stretch)), DVec3)| {
+    let mut by_factors = Vec::with_capacity(list.len());
+    for (((name, v), (_, stretch)), g) in factors.iter().zip(&list).zip(by_factor) {
         let by = match stretch {
             Stretch::Along(_) => Adjoint::Num(g.x),
             Stretch::Axes(_) => like(v, g),
         };
-        (Arc::clone(name), by)
-    };
-    let by_factors = factors.iter().zip(&list).zip(by_factor).map(one).collect();
+        by_factors.push((Arc::clone(name), by));
+    }
     Some(smallvec![armature_adjoint(&rest), Adjoint::Record(by_factors)])
 }
