@@ -97,8 +97,9 @@ mod tests {
                 let terms: Vec<f64> = found.iter().zip(way).map(|(g, d)| g.dot(d)).collect();
                 let (along, gross) = (terms.iter().sum::<f64>(), terms.iter().map(|t| t.abs()).sum::<f64>());
                 let slope = (sum(&moved(0.04)) - sum(&moved(-0.04))) / 0.08;
-                // What is gained on one side is mostly lost on the other; pixels are in or out.
-                assert!((along - slope).abs() < 0.03 * gross, "number {k}: {along} {slope} of {gross}");
+                // What is gained on one side is mostly lost on the other. Pixels are in or out: of the outline's 300, some 20 more or
+                // fewer by chance, each bringing about 1 to 3, over a difference of 0.08.
+                assert!((along - slope).abs() < 0.03 * gross + 400.0, "number {k}: {along} {slope} of {gross}");
             }
         }
     }
