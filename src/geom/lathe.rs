@@ -5,8 +5,10 @@
 
 use super::mesh::MOST_TRIANGLES;
 use super::profile_path::{OuterPath, Tolerance, floor_height, inner_wall};
-use super::revolve::{Strip, revolve};
+use super::real::{Real, Tape};
+use super::revolve::{Strip, pull_rings, revolve};
 use super::{GeomError, Mesh};
+use glam::DVec3;
 
 /// A profile: radii at heights, upwards. Lengths in scene units.
 #[derive(Clone, Debug, Default, PartialEq)]
@@ -59,13 +61,76 @@ pub(super) const SMALLEST: f64 = 1e-30;
 /// points, fewer than 3 or more than 1024 sides, more than five million triangles; if the object has no extent.
 pub fn lathe(parts: &[Profile], sides: u32, thickness: f64, caps: Caps) -> Result<Mesh, GeomError> {
     check(parts, sides, thickness)?;
-    let tolerance = Tolerance::of(parts).ok_or_else(|| GeomError::domain("lathe: the object has no extent"))?;
+    let Layout { strips, closed } = layout(parts, caps, thickness, |x| x)?;
+    Ok(revolve(&strips, sides, closed, parts.len() as u16 + 5))
+}
+
+/// The derivatives of something by what a lathe is made from.
+#[derive(Clone, Debug, PartialEq)]
+pub struct LatheGradient {
+    /// By the heights and radii of each profile.
+    pub profiles: Vec<Profile>,
+    /// By the thickness.
+    pub thickness: f64,
+}
+
+/// The vector-Jacobian product of [`lathe`]: from the derivatives of something by the mesh's vertices, in order. Which points
+/// count as one, and which ends as closed, is taken as it is.
+///
+/// # Errors
+/// As [`lathe`].
+pub fn pull_lathe(
+    parts: &[Profile],
+    sides: u32,
+    thickness: f64,
+    caps: Caps,
+    by_vertex: &[DVec3],
+) -> Result<LatheGradient, GeomError> {
+    check(parts, sides, thickness)?;
+    let tape = Tape::default();
+    let wall = tape.variable(thickness);
+    let mut inputs = Vec::new();
+    let number = |x| {
+        let v = tape.variable(x);
+        inputs.push(v);
+        v
+    };
+    let strips = layout(parts, caps, wall, number)?.strips;
+    let rings = pull_rings(&strips, sides, by_vertex);
+    let outputs = strips.iter().flat_map(|s| &s.points).zip(rings).flat_map(|(p, (r, y))| [(p.0, r), (p.1, y)]);
+    let slopes = tape.reverse(outputs);
+    let mut numbers = inputs.iter().map(|v| slopes[v.index()]);
+    let mut next = || numbers.next().unwrap_or(0.0);
+    let one = |p: &Profile| {
+        let (r, y) = p.r.iter().map(|_| (next(), next())).unzip();
+        Profile { y, r }
+    };
+    Ok(LatheGradient { profiles: parts.iter().map(one).collect(), thickness: slopes[wall.index()] })
+}
+
+/// The path of a lathe.
+struct Layout<T> {
+    strips: Vec<Strip<T>>,
+    /// Whether it ends where it begins.
+    closed: bool,
+}
+
+/// Lays out checked profiles; `number` is asked for each radius and height in turn.
+fn layout<T: Real>(
+    parts: &[Profile],
+    caps: Caps,
+    thickness: T,
+    number: impl FnMut(f64) -> T,
+) -> Result<Layout<T>, GeomError> {
+    let flat = || GeomError::domain("lathe: the object has no extent");
+    let tolerance = Tolerance::of(parts).ok_or_else(flat)?;
     let n = parts.len() as u16;
     let (ring, bottom_disc, rim, inner, floor) = (n, n + 1, n + 2, n + 3, n + 4);
-    let OuterPath { first, last, mut strips } = OuterPath::new(parts, &tolerance, ring);
-    let hollow = thickness > 0.0;
-    let bottom_pole = tolerance.is_tip(first.0) && !strips.is_empty();
-    let top_pole = tolerance.is_tip(last.0) && !strips.is_empty() && !hollow;
+    let OuterPath { first, last, mut strips } = OuterPath::new(parts, &tolerance, ring, number).ok_or_else(flat)?;
+    let axis = thickness.constant(0.0);
+    let hollow = thickness.value() > 0.0;
+    let bottom_pole = tolerance.is_tip(first.0.value()) && !strips.is_empty();
+    let top_pole = tolerance.is_tip(last.0.value()) && !strips.is_empty() && !hollow;
     let closed_bottom = bottom_pole || matches!(caps, Caps::Bottom | Caps::Both);
     let closed_top = top_pole || matches!(caps, Caps::Top | Caps::Both);
 
@@ -73,12 +138,16 @@ pub fn lathe(parts: &[Profile], sides: u32, thickness: f64, caps: Caps) -> Resul
     let mut after = Vec::new();
     let mut closed = false;
     if hollow {
-        let down_to = if closed_bottom { floor_height(first.1, last.1, thickness) } else { f64::NEG_INFINITY };
-        let (walls, start, end) = inner_wall(&strips, last, thickness, down_to, &tolerance, inner);
+        let down_to = if closed_bottom {
+            floor_height(first.1, last.1, thickness)
+        } else {
+            thickness.constant(f64::NEG_INFINITY)
+        };
+        let (walls, [start, end]) = inner_wall(&strips, last, thickness, down_to, &tolerance, inner);
         after.push(Strip { points: vec![last, start], parts: vec![rim], blend: false });
         after.extend(walls);
         if closed_bottom {
-            after.push(Strip { points: vec![end, (0.0, end.1)], parts: vec![floor], blend: false });
+            after.push(Strip { points: vec![end, (axis, end.1)], parts: vec![floor], blend: false });
         } else {
             after.push(Strip { points: vec![end, first], parts: vec![rim], blend: false });
             closed = true;
@@ -87,19 +156,19 @@ pub fn lathe(parts: &[Profile], sides: u32, thickness: f64, caps: Caps) -> Resul
     if bottom_pole {
         all.extend(strips[0].close_start());
     } else if closed_bottom {
-        all.push(Strip { points: vec![(0.0, first.1), first], parts: vec![bottom_disc], blend: false });
+        all.push(Strip { points: vec![(axis, first.1), first], parts: vec![bottom_disc], blend: false });
     }
     if top_pole {
         after.extend(strips.last_mut().and_then(Strip::close_end));
     } else if closed_top && !hollow {
-        after.push(Strip { points: vec![last, (0.0, last.1)], parts: vec![rim], blend: false });
+        after.push(Strip { points: vec![last, (axis, last.1)], parts: vec![rim], blend: false });
     }
     all.append(&mut strips);
     all.append(&mut after);
     if all.is_empty() {
         return Err(GeomError::domain("lathe: the object has no height and no discs"));
     }
-    Ok(revolve(&all, sides, closed, n + 5))
+    Ok(Layout { strips: all, closed })
 }
 
 fn check(parts: &[Profile], sides: u32, thickness: f64) -> Result<(), GeomError> {

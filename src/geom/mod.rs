@@ -16,20 +16,21 @@ mod lathe;
 mod mesh;
 pub mod obj;
 mod profile_path;
+mod real;
 mod revolve;
 mod solid;
 mod sphere;
 
 pub use affine::Affine;
 pub use bounds::Bounds;
-pub use cuboid::cuboid;
+pub use cuboid::{cuboid, pull_cuboid};
 pub use error::GeomError;
 pub use frame::{FileFrame, UpAxis};
 pub use landmark::Landmark;
-pub use lathe::{Caps, Profile, lathe};
+pub use lathe::{Caps, LatheGradient, Profile, lathe, pull_lathe};
 pub use mesh::{Edge, Mesh, NO_FACE, Topology};
-pub use solid::{Instance, Solid};
-pub use sphere::sphere;
+pub use solid::{Instance, PlacedGradient, Solid};
+pub use sphere::{pull_sphere, sphere};
 
 /// The matrix a b'.
 pub(crate) fn outer(a: glam::DVec3, b: glam::DVec3) -> glam::DMat3 {

@@ -1,9 +1,10 @@
 //! From profiles to the strips of a vessel's outer and inner wall.
 //!
-//! Works in the half plane (r, y), knows nothing of triangles. Invariant: neighbouring points differ by more than the
+//! Works in the half plane (r, y), knows nothing of triangles. Generic in its numbers, so that a tape gives derivatives. Invariant: neighbouring points differ by more than the
 //! tolerance, so that no triangle collapses in single precision, and each strip begins where the one before ends.
 
 use super::lathe::{Profile, SMALLEST};
+use super::real::Real;
 use super::revolve::Strip;
 
 /// Profiles that meet within this angle go on smoothly: the cosine of 40 degrees.
@@ -40,29 +41,40 @@ impl Tolerance {
         r <= self.tip
     }
 
-    fn near(&self, a: (f64, f64), b: (f64, f64)) -> bool {
+    fn near<T: Real>(&self, a: (T, T), b: (T, T)) -> bool {
+        let (a, b) = (values(a), values(b));
         (a.0 - b.0).abs() <= self.r && (a.1 - b.1).abs() <= self.y
     }
 }
 
-/// The outer wall.
-pub(super) struct OuterPath {
-    /// Its lowest point.
-    pub first: (f64, f64),
-    /// Its highest.
-    pub last: (f64, f64),
-    /// Its strips, rings at steps included; none if it is a single circle.
-    pub strips: Vec<Strip>,
+fn values<T: Real>(p: (T, T)) -> (f64, f64) {
+    (p.0.value(), p.1.value())
 }
 
-impl OuterPath {
-    /// Stacks checked profiles; steps get the part number `ring`.
-    pub fn new(parts: &[Profile], tolerance: &Tolerance, ring: u16) -> OuterPath {
-        let mut points: Vec<(f64, f64)> = Vec::new();
+/// The outer wall.
+pub(super) struct OuterPath<T> {
+    /// Its lowest point.
+    pub first: (T, T),
+    /// Its highest.
+    pub last: (T, T),
+    /// Its strips, rings at steps included; none if it is a single circle.
+    pub strips: Vec<Strip<T>>,
+}
+
+impl<T: Real> OuterPath<T> {
+    /// Stacks checked profiles; steps get the part number `ring`. `number` is asked for each radius and height in turn.
+    pub fn new(
+        parts: &[Profile],
+        tolerance: &Tolerance,
+        ring: u16,
+        mut number: impl FnMut(f64) -> T,
+    ) -> Option<OuterPath<T>> {
+        let mut points: Vec<(T, T)> = Vec::new();
         let mut labels: Vec<u16> = Vec::new();
         for (i, p) in parts.iter().enumerate() {
             for (k, (r, y)) in p.r.iter().zip(&p.y).enumerate() {
-                let q = (r.max(tolerance.tip), *y);
+                let (r, y) = (number(*r), number(*y));
+                let q = (if r.value() < tolerance.tip { r.constant(tolerance.tip) } else { r }, y);
                 match points.last() {
                     Some(end) if tolerance.near(*end, q) => {}
                     Some(_) => {
@@ -87,76 +99,82 @@ impl OuterPath {
                 start = k;
             }
         }
-        OuterPath { first: points[0], last: points[points.len() - 1], strips }
+        Some(OuterPath { first: *points.first()?, last: *points.last()?, strips })
     }
 }
 
 /// Whether the path a, b, c turns by less than a crease does.
-fn is_smooth(a: (f64, f64), b: (f64, f64), c: (f64, f64)) -> bool {
+fn is_smooth<T: Real>(a: (T, T), b: (T, T), c: (T, T)) -> bool {
+    let (a, b, c) = (values(a), values(b), values(c));
     let (u, v) = ((b.0 - a.0, b.1 - a.1), (c.0 - b.0, c.1 - b.1));
     let dot = u.0 * v.0 + u.1 * v.1;
     dot >= SMOOTH_COS * libm::hypot(u.0, u.1) * libm::hypot(v.0, v.1)
 }
 
 /// Whether a path that ends at the axis arrives there nearly at a right angle.
-fn is_dome(tip: (f64, f64), next: (f64, f64)) -> bool {
+fn is_dome<T: Real>(tip: (T, T), next: (T, T)) -> bool {
+    let (tip, next) = (values(tip), values(next));
     (next.1 - tip.1).abs() <= DOME_SLOPE * (next.0 - tip.0).abs()
 }
 
-impl Strip {
+impl<T: Real> Strip<T> {
     /// Closes the lower end, which is at the axis: a dome by a pole; a tip, which has no normal of its own, by a disc that
     /// is returned and goes before the strip.
-    pub fn close_start(&mut self) -> Option<Strip> {
+    pub fn close_start(&mut self) -> Option<Strip<T>> {
         let tip = self.points[0];
         if is_dome(tip, self.points[1]) {
-            self.points[0].0 = 0.0;
+            self.points[0].0 = tip.0.constant(0.0);
             return None;
         }
         self.blend = true;
-        Some(Strip { points: vec![(0.0, tip.1), tip], parts: vec![self.parts[0]], blend: false })
+        Some(Strip { points: vec![(tip.0.constant(0.0), tip.1), tip], parts: vec![self.parts[0]], blend: false })
     }
 
     /// Closes the upper end likewise; the disc goes after the strip.
-    pub fn close_end(&mut self) -> Option<Strip> {
+    pub fn close_end(&mut self) -> Option<Strip<T>> {
         let k = self.points.len() - 1;
         let tip = self.points[k];
         if is_dome(tip, self.points[k - 1]) {
-            self.points[k].0 = 0.0;
+            self.points[k].0 = tip.0.constant(0.0);
             return None;
         }
-        Some(Strip { points: vec![tip, (0.0, tip.1)], parts: vec![self.parts[k - 1]], blend: true })
+        Some(Strip { points: vec![tip, (tip.0.constant(0.0), tip.1)], parts: vec![self.parts[k - 1]], blend: true })
     }
 }
 
 /// The height of the floor inside.
-pub(super) fn floor_height(bottom: f64, top: f64, thickness: f64) -> f64 {
-    bottom + thickness.min(0.5 * (top - bottom))
+pub(super) fn floor_height<T: Real>(bottom: T, top: T, thickness: T) -> T {
+    let most = (top - bottom) * top.constant(0.5);
+    bottom + if thickness.value() < most.value() { thickness } else { most }
 }
 
 /// The inner wall from the rim, inside `last`, down to a height: its strips, its first and its last point. It has creases
 /// where the outer wall has them.
-pub(super) fn inner_wall(
-    outer: &[Strip],
-    last: (f64, f64),
-    thickness: f64,
-    down_to: f64,
+pub(super) fn inner_wall<T: Real>(
+    outer: &[Strip<T>],
+    last: (T, T),
+    thickness: T,
+    down_to: T,
     tolerance: &Tolerance,
     part: u16,
-) -> (Vec<Strip>, (f64, f64), (f64, f64)) {
-    let bore = |r: f64| (r - thickness).max(LEAST_BORE * r);
+) -> (Vec<Strip<T>>, [(T, T); 2]) {
+    let bore = |r: T| {
+        let (thin, least) = (r - thickness, r * r.constant(LEAST_BORE));
+        if thin.value() > least.value() { thin } else { least }
+    };
     let start = (bore(last.0), last.1);
     let (mut at, mut above) = (start, last);
     let mut walls = Vec::new();
     for s in outer.iter().rev() {
         let mut points = vec![at];
         for (r, y) in s.points.iter().rev().skip(1) {
-            if above.1 <= down_to {
+            if above.1.value() <= down_to.value() {
                 break;
             }
-            let q = if *y < down_to {
+            let q = if y.value() < down_to.value() {
                 // The last piece ends at the floor.
-                let t = (down_to - y) / (above.1 - y);
-                (bore(r + t * (above.0 - r)), down_to)
+                let t = (down_to - *y).over(above.1 - *y);
+                (bore(*r + t * (above.0 - *r)), down_to)
             } else {
                 (bore(*r), *y)
             };
@@ -170,5 +188,5 @@ pub(super) fn inner_wall(
             walls.push(Strip { parts: vec![part; points.len() - 1], points, blend: false });
         }
     }
-    (walls, start, at)
+    (walls, [start, at])
 }

@@ -6,16 +6,17 @@
 //! Invariant: the mesh is the same whether its topology was found in the cache or not.
 
 use super::edges::pair_edges;
+use super::real::Real;
 use super::{Edge, Mesh, NO_FACE, Topology};
-use glam::Vec3;
+use glam::{DVec3, Vec3};
 use std::cell::RefCell;
 use std::sync::Arc;
 
 /// A smooth piece of the path.
 #[derive(Clone, Debug, Default)]
-pub(super) struct Strip {
+pub(super) struct Strip<T = f64> {
     /// Points (r, y); consecutive ones differ. Radius 0 is a pole and allowed at the very ends of the strip only.
-    pub points: Vec<(f64, f64)>,
+    pub points: Vec<(T, T)>,
     /// The part of each segment.
     pub parts: Vec<u16>,
     /// Whether the seam to the strip before is no crease although its normals differ.
@@ -66,6 +67,27 @@ pub(super) fn revolve(strips: &[Strip], sides: u32, closed: bool, part_count: u1
         }
     }
     Mesh { positions, normals, topology }
+}
+
+/// From the derivatives of something by the vertices of [`revolve`] to those by each point (r, y) of the path in turn.
+pub(super) fn pull_rings<T: Real>(strips: &[Strip<T>], sides: u32, by_vertex: &[DVec3]) -> Vec<(f64, f64)> {
+    let circle = circle(sides);
+    let mut rest = by_vertex;
+    let mut next = || match rest.split_first() {
+        Some((g, after)) => {
+            rest = after;
+            *g
+        }
+        None => DVec3::ZERO,
+    };
+    let one = |p: &(T, T)| match p.0.value() {
+        0.0 => (0.0, next().y),
+        _ => circle.iter().fold((0.0, 0.0), |(r, y), (c, s)| {
+            let g = next();
+            (r + g.x * c + g.z * s, y + g.y)
+        }),
+    };
+    strips.iter().flat_map(|s| &s.points).map(one).collect()
 }
 
 /// Cosine and sine of each meridian's angle from x towards z.

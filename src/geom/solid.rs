@@ -6,8 +6,8 @@
 
 use super::landmark::{Landmark, unique};
 use super::mesh::{MOST_PARTS, MOST_TRIANGLES};
-use super::{Affine, Bounds, Edge, GeomError, Mesh, NO_FACE, Topology};
-use glam::DVec3;
+use super::{Affine, Bounds, Edge, GeomError, Mesh, NO_FACE, Topology, outer};
+use glam::{DMat3, DVec3};
 use std::fmt;
 use std::sync::{Arc, LazyLock};
 
@@ -36,6 +36,19 @@ impl fmt::Debug for Solid {
     fn fmt(&self, f: &mut fmt::Formatter<'_>) -> fmt::Result {
         f.debug_struct("Solid").field("instances", &self.instances()).field("landmarks", &self.landmarks).finish()
     }
+}
+
+/// The derivatives of something by what a placed solid is made from.
+#[derive(Clone, Debug, PartialEq)]
+pub struct PlacedGradient {
+    /// By the placement's linear part.
+    pub linear: DMat3,
+    /// By its shift.
+    pub shift: DVec3,
+    /// By the vertices before they were placed.
+    pub vertices: Vec<DVec3>,
+    /// By the landmarks before they were placed.
+    pub landmarks: Vec<DVec3>,
 }
 
 /// A solid whose meshes are there already.
@@ -110,8 +123,7 @@ impl Solid {
 
     /// The smallest box around all vertices; `None` if there are none.
     pub fn bounds(&self) -> Option<Bounds> {
-        let points = self.instances.iter().flat_map(|i| i.mesh.positions.iter().map(|p| i.affine.point(p.as_dvec3())));
-        Bounds::around(points)
+        Bounds::around(self.vertices())
     }
 
     /// Moved so that the centre of its box is the origin; with `fit` also scaled so that half the box's longest edge is 1.
@@ -122,6 +134,68 @@ impl Solid {
         let scale = if fit && half > 0.0 { 1.0 / half } else { 1.0 };
         let by = Affine::new(-scale * b.centre(), DVec3::ZERO, DVec3::splat(scale));
         if by.is_finite() { self.placed(by) } else { self.clone() }
+    }
+
+    /// The number of vertices of all its meshes.
+    pub fn vertex_count(&self) -> usize {
+        self.instances.iter().map(|i| i.mesh.positions.len()).sum()
+    }
+
+    /// The vertices of all its meshes in turn, in world coordinates.
+    pub fn vertices(&self) -> impl Iterator<Item = DVec3> {
+        self.instances.iter().flat_map(|i| i.mesh.positions.iter().map(|p| i.affine.point(p.as_dvec3())))
+    }
+
+    /// The vector-Jacobian product of [`Solid::placed`]: from the derivatives of something by the vertices and landmarks of the
+    /// placed solid, in world coordinates. No vertices: nothing depends on them.
+    pub fn pull_placed(&self, by: Affine, by_vertex: &[DVec3], by_landmark: &[DVec3]) -> PlacedGradient {
+        let (mut linear, mut shift) = (DMat3::ZERO, DVec3::ZERO);
+        let back = by.0.matrix3.transpose();
+        let mut pull = |p: DVec3, by: &DVec3| {
+            // Most vertices make no contour.
+            if *by == DVec3::ZERO {
+                return DVec3::ZERO;
+            }
+            linear += outer(*by, p);
+            shift += *by;
+            back * *by
+        };
+        let vertices = if by_vertex.is_empty() {
+            Vec::new()
+        } else {
+            self.vertices().zip(by_vertex).map(|(p, by)| pull(p, by)).collect()
+        };
+        let landmarks = self.landmarks.iter().zip(by_landmark).map(|(l, by)| pull(l.position, by)).collect();
+        PlacedGradient { linear, shift, vertices, landmarks }
+    }
+
+    /// The vector-Jacobian product of [`Solid::centred`], like that of [`Solid::pull_placed`]: by vertices and landmarks.
+    pub fn pull_centred(&self, fit: bool, by_vertex: &[DVec3], by_landmark: &[DVec3]) -> (Vec<DVec3>, Vec<DVec3>) {
+        let Some(b) = self.bounds() else { return (by_vertex.to_vec(), by_landmark.to_vec()) };
+        let (size, centre) = (b.size(), b.centre());
+        let half = 0.5 * size.max_element();
+        let scale = if fit && half > 0.0 { 1.0 / half } else { 1.0 };
+        let by = Affine::new(-scale * centre, DVec3::ZERO, DVec3::splat(scale));
+        if !by.is_finite() {
+            return (by_vertex.to_vec(), by_landmark.to_vec());
+        }
+        let PlacedGradient { linear, shift, mut vertices, landmarks } = self.pull_placed(by, by_vertex, by_landmark);
+        vertices.resize(self.vertex_count(), DVec3::ZERO);
+        let by_centre = shift * -scale;
+        // By half the longest edge, through the scale.
+        let trace = linear.x_axis.x + linear.y_axis.y + linear.z_axis.z;
+        let by_half = if scale == 1.0 / half && fit { (shift.dot(centre) - trace) * scale * scale } else { 0.0 };
+        for axis in 0..3 {
+            let longest = size[axis] == size.max_element() && (0..axis).all(|a| size[a] < size[axis]);
+            let by_half = if longest { 0.5 * by_half } else { 0.0 };
+            for (end, sign) in [(b.max[axis], 1.0), (b.min[axis], -1.0)] {
+                // The first vertex at that side of the box.
+                if let Some(v) = self.vertices().position(|p| p[axis] == end) {
+                    vertices[v][axis] += 0.5 * by_centre[axis] + sign * by_half;
+                }
+            }
+        }
+        (vertices, landmarks)
     }
 
     /// One mesh in world coordinates, for export: the same faces, normals and creases as its members, in order. Where a

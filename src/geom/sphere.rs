@@ -3,6 +3,7 @@
 use super::lathe::SMALLEST;
 use super::revolve::{Strip, revolve};
 use super::{GeomError, Mesh};
+use glam::DVec3;
 
 /// A sphere round the origin with `sides` meridians and half as many rings.
 ///
@@ -27,6 +28,11 @@ pub fn sphere(radius: f64, sides: u32) -> Result<Mesh, GeomError> {
         *n = p.as_dvec3().normalize_or(n.as_dvec3()).as_vec3();
     }
     Ok(mesh)
+}
+
+/// From the derivatives of something by the vertices of a sphere of this radius to that by the radius.
+pub fn pull_sphere(radius: f64, mesh: &Mesh, by_vertex: &[DVec3]) -> f64 {
+    mesh.positions.iter().zip(by_vertex).map(|(p, g)| p.as_dvec3().dot(*g)).sum::<f64>() / radius
 }
 
 #[cfg(test)]

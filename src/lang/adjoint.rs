@@ -82,6 +82,9 @@ impl Adjoint {
             (Adjoint::Record(_), Adjoint::Record(fields)) => {
                 fields.into_iter().for_each(|(name, by)| self.add_field(&name, by));
             }
+            (Adjoint::List(a), Adjoint::List(b)) if a.len() == b.len() => {
+                a.iter_mut().zip(b).for_each(|(a, b)| a.add(b));
+            }
             (Adjoint::Array(_) | Adjoint::List(_), other @ (Adjoint::Array(_) | Adjoint::List(_))) => {
                 let n = match &other {
                     Adjoint::List(all) => all.len(),

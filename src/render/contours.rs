@@ -128,7 +128,7 @@ fn trace(
         let Some(points) = points.get(base..base + count) else { break };
         base += count;
         let placement = Placement::new(camera, &instance.affine);
-        trace_mesh(&instance.mesh, &placement, camera, points, facing, |piece| {
+        trace_mesh(&instance.mesh, &placement, camera, points, facing, |piece, _| {
             if depths.visible(&piece) {
                 out.push(&piece);
             }

@@ -184,7 +184,7 @@ impl Layer {
         draw_mesh(&instance.mesh, &placement, camera, points, &self.area, &mut self.depth);
         to_depth(camera, &mut self.depth);
         self.pieces.clear();
-        trace_mesh(&instance.mesh, &placement, camera, points, facing, |piece| self.pieces.push(piece));
+        trace_mesh(&instance.mesh, &placement, camera, points, facing, |piece, _| self.pieces.push(piece));
     }
 
     /// Puts what is nearer than the picture into it.

@@ -14,6 +14,20 @@ fn usable(p: &Point) -> bool {
     p.depth >= Camera::NEAR
 }
 
+/// Where on the surface a piece comes from: a share of a segment between two points of a face or edge. Silhouettes wander over
+/// the surface when it turns, but to first order they move, at right angles to themselves, as its points do.
+#[derive(Clone, Copy, Debug)]
+pub(super) struct Origin {
+    /// Vertices of the mesh; of an edge, its second one twice.
+    pub corners: [u32; 3],
+    /// The segment's ends, as shares of the corners.
+    pub ends: [[f64; 3]; 2],
+    /// The piece's middle on the segment's image, 0 at the first end and 1 at the second.
+    pub at: f64,
+    /// Its share of the segment's image.
+    pub share: f64,
+}
+
 /// Calls `out` for every piece of a mesh, in the order of its faces and edges. `points` are its vertices in the image;
 /// `facing` is overwritten.
 pub(super) fn trace_mesh(
@@ -22,12 +36,15 @@ pub(super) fn trace_mesh(
     camera: &Camera,
     points: &[Point],
     facing: &mut Vec<f64>,
-    out: impl FnMut(Piece),
+    out: impl FnMut(Piece, &Origin),
 ) {
     let Some(image) = Image::new(camera.width, camera.height) else { return };
     let size = [f64::from(camera.width), f64::from(camera.height)];
     Tracer { lens: Lens::new(camera), image, size, out }.mesh(mesh, placement, points, facing);
 }
+
+/// A segment's corners and ends, as in [`Origin`].
+type Segment = ([u32; 3], [[f64; 3]; 2]);
 
 struct Tracer<F> {
     lens: Lens,
@@ -37,7 +54,7 @@ struct Tracer<F> {
     out: F,
 }
 
-impl<F: FnMut(Piece)> Tracer<F> {
+impl<F: FnMut(Piece, &Origin)> Tracer<F> {
     fn mesh(&mut self, mesh: &Mesh, placement: &Placement, points: &[Point], facing: &mut Vec<f64>) {
         let open = mesh.topology.edges.iter().any(|e| e.faces[1] == u32::MAX);
         facing.clear();
@@ -98,7 +115,8 @@ impl<F: FnMut(Piece)> Tracer<F> {
             true => Look::BothSides { direction, slack: [slack; 2] },
         };
         let flip = ty * direction[0] - tx * direction[1] < 0.0;
-        self.cut(&a, &b, if flip { [-tx, -ty] } else { [tx, ty] }, &look, false);
+        let ends = [[1.0 - u, u, 0.0], [1.0 - v, 0.0, v]];
+        self.cut(&a, &b, if flip { [-tx, -ty] } else { [tx, ty] }, &look, false, (corners, ends));
     }
 
     /// A crease or boundary edge.
@@ -150,7 +168,9 @@ impl<F: FnMut(Piece)> Tracer<F> {
         }
         if any_front || open {
             let look = Look::BothSides { direction, slack };
-            self.cut(&a, &b, if side < 0.0 { [-tx, -ty] } else { [tx, ty] }, &look, true);
+            let corners = [vertices[0], vertices[1], vertices[1]];
+            let ends = [[1.0, 0.0, 0.0], [0.0, 1.0, 0.0]];
+            self.cut(&a, &b, if side < 0.0 { [-tx, -ty] } else { [tx, ty] }, &look, true, (corners, ends));
         }
     }
 
@@ -176,7 +196,7 @@ impl<F: FnMut(Piece)> Tracer<F> {
     }
 
     /// Clips a segment to the image and divides it.
-    fn cut(&mut self, a: &Point, b: &Point, tangent: [f64; 2], look: &Look, edge: bool) {
+    fn cut(&mut self, a: &Point, b: &Point, tangent: [f64; 2], look: &Look, edge: bool, from: Segment) {
         let (dx, dy) = (b.x - a.x, b.y - a.y);
         let Some((t0, t1)) = clip(a, [dx, dy], self.size) else { return };
         let length = (dx * dx + dy * dy).sqrt() * (t1 - t0);
@@ -190,7 +210,8 @@ impl<F: FnMut(Piece)> Tracer<F> {
             let at = [a.x + dx * t, a.y + dy * t];
             let depth = self.lens.depth(a.nearness + (b.nearness - a.nearness) * t);
             if depth.is_finite() {
-                (self.out)(self.image.piece(at, depth, tangent, length / pieces, look, edge));
+                let origin = Origin { corners: from.0, ends: from.1, at: t, share: step };
+                (self.out)(self.image.piece(at, depth, tangent, length / pieces, look, edge), &origin);
             }
         }
     }

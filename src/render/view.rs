@@ -5,6 +5,7 @@
 
 use super::{Camera, Channels, Contours, Frame};
 use crate::geom::Solid;
+use glam::DVec3;
 use std::sync::{Arc, Mutex, PoisonError};
 
 /// Values by image size; few sizes are ever asked for, so a list is enough.
@@ -62,6 +63,11 @@ impl View {
                 None => Contours::of(&self.solid, &camera),
             }
         })
+    }
+
+    /// The vector-Jacobian product of [`View::contours`] by the solid's vertices: [`Contours::pull`].
+    pub fn pull_contours(&self, size: u32, by_piece: &[[f64; 4]]) -> Vec<DVec3> {
+        self.contours(size).pull(&self.solid, &self.camera.scaled_to(size), by_piece)
     }
 }
 

@@ -4,12 +4,13 @@
 //! [`ContourRatio`](super::contour_ratio::ContourRatio). Invariant: scores are finite, continuous in positions, and sums run
 //! in the elements' order in f64.
 
+mod gradient;
 mod reverse;
 
 use self::reverse::Reverse;
 use super::contour_map::ContourMap;
 use super::elements::{ComparatorError, Element, Elements, check};
-use super::field::{CHANNELS, Edges, channels_of, turn_between};
+use super::field::{CHANNELS, Edges, PER_RADIAN, channels_of, turn_between};
 use crate::num::LN_SQRT_2PI;
 
 pub use self::reverse::Scratch;
@@ -148,47 +149,6 @@ impl Chamfer {
         score.max(f64::MIN)
     }
 
-    /// The log-likelihood of the one-sided mean, and its derivatives in the elements' positions (per pixel) into `out`,
-    /// which must have a place for every element. Orientations and lengths are held fixed. The score is piecewise smooth:
-    /// at the grid's lines the derivative is that of one side.
-    ///
-    /// # Errors
-    /// A comparator that is symmetric or a sum, or an `out` that is too short.
-    pub fn gradient(&self, elements: &Elements<'_>, out: &mut [[f64; 2]]) -> Result<f64, ComparatorError> {
-        if self.reverse.is_some() || self.options.mode != Mode::Mean {
-            return Err(ComparatorError::NoGradient);
-        }
-        let (need, got) = (elements.len(), out.len());
-        let out = out.get_mut(..need).ok_or(ComparatorError::Output { need, got })?;
-        out.fill([0.0; 2]);
-        let sums = self.forth(elements);
-        let rho = sums.mean();
-        if sums.length > 0.0 {
-            let (w, h) = (elements.width as f32, elements.height as f32);
-            let outer = -rho / (self.options.sigma * self.options.sigma) / sums.length;
-            for e in elements.in_view() {
-                let (d, mut dx, mut dy) = self.read(&e);
-                if self.options.truncate.is_some_and(|t| f64::from(d) >= t) {
-                    (dx, dy) = (0.0, 0.0);
-                }
-                let length = f64::from(e.length) * self.percent * outer;
-                let mut g = [length * f64::from(e.weight * dx), length * f64::from(e.weight * dy)];
-                if e.weight < 1.0 {
-                    // In the half pixel at the border the weight moves with the nearest side.
-                    let excess = length * (self.cut(d) - rho);
-                    let sides = [(e.x, 0, 1.0), (w - e.x, 0, -1.0), (e.y, 1, 1.0), (h - e.y, 1, -1.0)];
-                    if let Some(&(_, axis, sign)) = sides.iter().min_by(|a, b| a.0.total_cmp(&b.0)) {
-                        g[axis] += sign * excess;
-                    }
-                }
-                if let Some(place) = out.get_mut(e.index) {
-                    *place = g.map(|g| if g.is_finite() { g } else { 0.0 });
-                }
-            }
-        }
-        Ok(self.log_normal(rho).max(f64::MIN))
-    }
-
     fn log_normal(&self, distance: f64) -> f64 {
         let z = distance / self.options.sigma;
         -0.5 * z * z - libm::log(self.options.sigma) - LN_SQRT_2PI
@@ -199,17 +159,18 @@ impl Chamfer {
         self.options.truncate.map_or(d, |t| d.min(t))
     }
 
-    /// Distance at an element and its derivatives per pixel of the frame.
-    fn read(&self, e: &Element) -> (f32, f32, f32) {
+    /// Distance at an element, and its derivatives per pixel of the frame and by the angle of the tangent.
+    fn read(&self, e: &Element) -> (f32, [f32; 3]) {
         let corners = self.grid.corners(e.x, e.y);
-        let (d, dx, dy) = if let [field] = self.fields.as_slice() {
-            corners.read(field)
+        let (d, dx, dy, turn) = if let [field] = self.fields.as_slice() {
+            let (d, dx, dy) = corners.read(field);
+            (d, dx, dy, 0.0)
         } else {
             let (low, high, f) = channels_of(e.tx, e.ty);
             let (a, b) = (corners.read(&self.fields[low]), corners.read(&self.fields[high]));
-            (a.0 + f * (b.0 - a.0), a.1 + f * (b.1 - a.1), a.2 + f * (b.2 - a.2))
+            (a.0 + f * (b.0 - a.0), a.1 + f * (b.1 - a.1), a.2 + f * (b.2 - a.2), (b.0 - a.0) * PER_RADIAN)
         };
-        (d, dx * self.grid.sx, dy * self.grid.sy)
+        (d, [dx * self.grid.sx, dy * self.grid.sy, turn])
     }
 
     fn forth(&self, elements: &Elements<'_>) -> Sums {
@@ -222,13 +183,17 @@ impl Chamfer {
 
     fn back(&self, elements: &Elements<'_>, scratch: &mut Scratch) -> Option<Sums> {
         let reverse = self.reverse.as_ref()?;
-        let turn = self.options.oriented.unwrap_or(0.0) * std::f64::consts::PI / CHANNELS as f64 / self.percent;
         let mut sums = Sums::default();
-        reverse.each(elements, turn as f32, scratch, |length, distance| {
+        reverse.each(elements, self.turn(), scratch, |length, distance, _| {
             let distance = (f64::from(distance) * self.percent).min(NOTHING);
             sums.add(f64::from(length) * self.percent, self.cut(distance as f32));
         });
         Some(sums)
+    }
+
+    /// The cost in pixels of one channel's turn.
+    fn turn(&self) -> f32 {
+        (self.options.oriented.unwrap_or(0.0) * std::f64::consts::PI / CHANNELS as f64 / self.percent) as f32
     }
 }
 

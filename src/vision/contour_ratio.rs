@@ -10,6 +10,7 @@
 
 mod background;
 mod credit;
+mod gradient;
 
 use self::background::scores;
 use self::credit::{Capacity, NO_GROUP};

@@ -147,6 +147,35 @@ impl DepthLikelihood {
         Ok(self.observed.data.iter().zip(rendered).map(|(&o, &r)| self.log_density(f64::from(o), f64::from(r))).sum())
     }
 
+    /// For each pixel the derivative of the log density by its rendered depth; 0 where either is background.
+    pub fn slopes(&self, rendered: &[f32]) -> Vec<f64> {
+        let slope = |(o, r): (&f32, &f32)| {
+            let (o, r) = (f64::from(*o), f64::from(*r));
+            if !(o.is_finite() && r.is_finite()) {
+                return 0.0;
+            }
+            let z = (o - r) / self.sd;
+            let good = libm::log1p(-self.outlier) - 0.5 * z * z - libm::log(self.sd) - LN_SQRT_2PI;
+            libm::exp(good - self.log_density(o, r)) * z / self.sd
+        };
+        self.observed.data.iter().zip(rendered).map(slope).collect()
+    }
+
+    /// For each pixel, how much the log density grows where the object covers it. Beside the object it would have the depth of the
+    /// pixel next to it; further away it is 0.
+    pub fn gains(&self, rendered: &[f32]) -> Vec<f64> {
+        let width = self.observed.width as usize;
+        let depth = |i: usize| rendered.get(i).copied().filter(|r| r.is_finite());
+        let gain = |(i, o): (usize, &f32)| {
+            let beside = [i.checked_sub(1), Some(i + 1), i.checked_sub(width), Some(i + width)];
+            let r = depth(i).or_else(|| beside.into_iter().flatten().find_map(depth));
+            r.map_or(0.0, |r| {
+                self.log_density(f64::from(*o), f64::from(r)) - self.log_density(f64::from(*o), f64::INFINITY)
+            })
+        };
+        self.observed.data.iter().enumerate().map(gain).collect()
+    }
+
     /// Log density of an observed depth given a rendered one.
     fn log_density(&self, observed: f64, rendered: f64) -> f64 {
         let ln_half = libm::log(0.5 * self.outlier);

@@ -71,6 +71,21 @@ impl Elements<'_> {
     }
 }
 
+impl Elements<'_> {
+    /// The derivatives by an element's x and y of how far it is in view: in the half pixel at the border, that of the nearest side.
+    pub(super) fn view_slope(&self, e: &Element) -> [f64; 2] {
+        let (w, h) = (self.width as f32, self.height as f32);
+        let sides = [(e.x, 0, 1.0), (w - e.x, 0, -1.0), (e.y, 1, 1.0), (h - e.y, 1, -1.0)];
+        let mut slope = [0.0; 2];
+        if e.weight < 1.0
+            && let Some((_, axis, sign)) = sides.into_iter().min_by(|a, b| a.0.total_cmp(&b.0))
+        {
+            slope[axis] = sign;
+        }
+        slope
+    }
+}
+
 /// Why a comparator could not be prepared or asked.
 #[derive(Debug, Clone, PartialEq, Eq, Error)]
 pub enum ComparatorError {
@@ -96,17 +111,6 @@ pub enum ComparatorError {
     /// A quantised picture whose labels do not fit it.
     #[error("a picture in few colours needs one label a pixel, each below the number of colours, 1 to 256")]
     Labels,
-    /// A gradient was asked of a comparator that has none.
-    #[error("only the one-sided mean distance has a gradient")]
-    NoGradient,
-    /// The output slice is too short.
-    #[error("the gradient needs {need} places, not {got}")]
-    Output {
-        /// Number of elements.
-        need: usize,
-        /// Length of the slice.
-        got: usize,
-    },
 }
 
 /// Length in pixels of the diagonal of a `width` x `height` picture.

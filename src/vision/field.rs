@@ -13,6 +13,9 @@ pub const FIELD_SIDE: u32 = 256;
 /// Number of orientation channels, `PI / 8` apart.
 pub(super) const CHANNELS: usize = 8;
 
+/// Channels in a radian.
+pub(super) const PER_RADIAN: f32 = CHANNELS as f32 / std::f32::consts::PI;
+
 /// An observed contour point as a short straight piece, in grid units.
 #[derive(Debug, Clone, Copy, PartialEq)]
 pub(super) struct Edge {
@@ -177,7 +180,7 @@ impl Corners {
 
 /// Orientation of a tangent in channels: the angle modulo PI, times 8 / PI, within 0..8.
 pub(super) fn channel(tx: f32, ty: f32) -> f32 {
-    let k = libm::atan2f(ty, tx) * (CHANNELS as f32 / std::f32::consts::PI);
+    let k = libm::atan2f(ty, tx) * PER_RADIAN;
     let k = if k < 0.0 { k + CHANNELS as f32 } else { k };
     if k >= CHANNELS as f32 { k - CHANNELS as f32 } else { k }
 }

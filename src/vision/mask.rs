@@ -145,6 +145,13 @@ impl MaskLikelihood {
             + counts[0][0] as f64 * libm::log1p(-self.eps_out))
     }
 
+    /// For each pixel, how much the log probability grows if the object covers it.
+    pub fn gains(&self) -> Vec<f64> {
+        let (seen, unseen) =
+            (libm::log1p(-self.eps_in) - libm::log(self.eps_out), libm::log(self.eps_in) - libm::log1p(-self.eps_out));
+        self.observed.data.iter().map(|o| if *o { seen } else { unseen }).collect()
+    }
+
     /// Log probability of the observed mask given the part of every pixel that the rendered object covers (0..=1): a pixel half
     /// covered is a toss between the two cases. Values of 0 and 1 give [`MaskLikelihood::log_likelihood`].
     pub fn log_likelihood_coverage(&self, coverage: &[f32], width: u32, height: u32) -> Result<f64, VisionError> {

@@ -76,6 +76,34 @@ impl Pieces {
         r
     }
 
+    /// With the x, y, length or angle (0 to 3) of one piece changed by so much.
+    pub fn nudged(&self, i: usize, k: usize, by: f32) -> Self {
+        let mut r = self.clone();
+        match k {
+            0 => r.x[i] += by,
+            1 => r.y[i] += by,
+            2 => r.length[i] += by,
+            _ => {
+                let (sin, cos) = (libm::sinf(by), libm::cosf(by));
+                let (tx, ty) = (r.tx[i], r.ty[i]);
+                (r.tx[i], r.ty[i]) = (tx * cos - ty * sin, tx * sin + ty * cos);
+            }
+        }
+        r
+    }
+
+    /// Counts the derivatives by x, y, length and angle that differ from central differences of a score, which may do so where
+    /// a difference straddles a bend.
+    pub fn differing(&self, found: &[[f64; 4]], score: impl Fn(&Elements<'_>) -> f64) -> usize {
+        let h = 1.0f32 / 128.0;
+        let differs = |i: usize, k: usize| {
+            let at = |by: f32| score(&self.nudged(i, k, by).elements());
+            let numeric = (at(h) - at(-h)) / f64::from(2.0 * h);
+            (numeric - found[i][k]).abs() > 2e-3 * (numeric.abs() + 1e-2)
+        };
+        (0..found.len()).flat_map(|i| (0..4).map(move |k| (i, k))).filter(|(i, k)| differs(*i, *k)).count()
+    }
+
     /// Moved by some pixels.
     pub fn moved(&self, dx: f32, dy: f32) -> Self {
         let mut r = self.clone();

@@ -7,7 +7,7 @@
 
 use super::morph::{Anchor, Morph};
 use super::recent;
-use super::{JointPose, Rig, Rules};
+use super::{JointPose, RestGradient, Rig, Rules};
 use crate::geom::{GeomError, Landmark, Mesh, Solid, Topology, edges, outer};
 use glam::{Affine3A, DAffine3, DVec3, Mat3A, Vec3, Vec3A};
 use std::sync::{Arc, LazyLock};
@@ -258,12 +258,22 @@ impl Armature {
         Ok(solid.with_landmarks(landmarks))
     }
 
-    /// From the derivatives by the heads and keypoints at rest to that by the amount of a morph; `None` if it has no such morph.
-    pub fn pull_morph(&self, name: &str, heads: &[DVec3], keypoints: &[DVec3]) -> Option<f64> {
+    /// From the derivatives by the body at rest to that by the amount of a morph; `None` if it has no such morph.
+    pub fn pull_morph(&self, name: &str, by: &RestGradient) -> Option<f64> {
         let m = self.skin.morphs.iter().find(|m| *m.name == *name)?;
-        let by_heads: f64 = m.heads.iter().zip(heads).map(|(d, g)| d.dot(*g)).sum();
-        let points = self.skin.anchors.iter().zip(keypoints);
-        Some(by_heads + points.map(|(anchor, g)| m.at(*anchor).dot(*g)).sum::<f64>())
+        let dot = |offsets: &[DVec3], by: &[DVec3]| offsets.iter().zip(by).map(|(d, g)| d.dot(*g)).sum::<f64>();
+        let points = self.skin.anchors.iter().zip(&by.keypoints).map(|(anchor, g)| m.at(*anchor).dot(*g));
+        let vertices = m.vertices.iter().zip(&by.vertices).map(|(d, g)| d.as_dvec3().dot(*g));
+        Some(dot(&m.heads, &by.heads) + dot(&m.tails, &by.tails) + points.sum::<f64>() + vertices.sum::<f64>())
+    }
+
+    /// From derivatives by the vertices of a posed body's meshes in turn to those by the body's own; the parts share some.
+    pub fn pull_parts(&self, by_vertex: &[DVec3]) -> Vec<DVec3> {
+        let mut all = vec![DVec3::ZERO; self.skin.influences.len()];
+        for (v, g) in self.skin.parts.iter().flat_map(|p| &p.vertices).zip(by_vertex) {
+            all[*v as usize] += *g;
+        }
+        all
     }
 
     pub(super) fn skin(&self) -> Arc<Skin> {

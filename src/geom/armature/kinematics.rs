@@ -10,9 +10,9 @@
 //! is pulled straight through an ancestor.
 
 use super::pose::Motion;
-use super::real::{M3, Real, Tape, V3, Var};
 use super::{JointPose, Rig, Rules};
 use crate::geom::GeomError;
+use crate::geom::real::{M3, Real, Tape, V3, Var};
 use glam::{DAffine3, DMat3, DVec3};
 
 /// Where a joint takes points: p' = linear p + shift.

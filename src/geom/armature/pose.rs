@@ -1,7 +1,7 @@
 //! Poses: what each joint of a rig does. Plain numbers; how they move a body is the business of `kinematics`.
 
-use super::real::{M3, Real, V3};
 use crate::geom::GeomError;
+use crate::geom::real::{M3, Real, V3};
 use glam::{DMat3, DVec3};
 
 /// How a joint turns, about the world's axes through its rest head.

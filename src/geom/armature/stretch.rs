@@ -1,8 +1,8 @@
 //! Other proportions: bones made longer or shorter at rest, with what hangs on them moved along.
 
-use super::{Armature, Rig};
+use super::{Armature, Influence, RestGradient, Rig};
 use crate::geom::{GeomError, outer};
-use glam::{DAffine3, DMat3, DVec3};
+use glam::{DAffine3, DMat3, DVec3, Vec3};
 
 /// How a bone's surroundings are stretched about its head.
 #[derive(Clone, Copy, Debug, PartialEq)]
@@ -56,8 +56,82 @@ impl Armature {
     }
 }
 
-/// By joint: where it takes the points at rest.
-fn maps(rig: &Rig, by_joint: &[(usize, Stretch)]) -> Result<Vec<DAffine3>, GeomError> {
+impl Armature {
+    /// The vector-Jacobian product of [`Armature::stretched`], from the derivatives of something by the stretched body at rest: by
+    /// each factor, or those along the axes (of a factor along the bone the first counts), and by this body at rest.
+    ///
+    /// # Errors
+    /// As [`Armature::stretched`].
+    pub fn pull_stretched(
+        &self,
+        by_joint: &[(usize, Stretch)],
+        by: &RestGradient,
+    ) -> Result<(Vec<DVec3>, RestGradient), GeomError> {
+        let rig = self.rig();
+        let (joints, stretches) = (rig.joints(), stretches(rig, by_joint)?);
+        let linear: Vec<DMat3> =
+            joints.iter().zip(&stretches).map(|(joint, s)| s.linear(joint.tail - joint.head)).collect();
+        // A joint takes a point x to L (x - head) + head'.
+        let (mut by_linear, mut by_new_head) = (vec![DMat3::ZERO; joints.len()], by.heads.clone());
+        let mut out = RestGradient { heads: vec![DVec3::ZERO; joints.len()], ..RestGradient::default() };
+        let heads = &mut out.heads;
+        let mut take = |j: usize, x: DVec3, g: DVec3| {
+            let back = linear[j].transpose() * g;
+            by_linear[j] += outer(g, x - joints[j].head);
+            by_new_head[j] += g;
+            heads[j] -= back;
+            back
+        };
+        let tails = by.tails.iter().enumerate();
+        out.tails = tails.map(|(j, g)| take(j, joints[j].tail, *g)).collect();
+        let points = rig.keypoints().iter().zip(&by.keypoints);
+        out.keypoints = points.map(|(k, g)| take(k.joint, k.rest, *g)).collect();
+        if !by.vertices.is_empty() {
+            let skin = self.skin();
+            let vertices = self.positions().iter().zip(&skin.influences).zip(&by.vertices);
+            let vertex = |((p, i), g): ((&Vec3, &Influence), &DVec3)| {
+                i.joints().map(|(j, w)| take(j, p.as_dvec3(), *g * w)).sum::<DVec3>()
+            };
+            out.vertices = vertices.map(vertex).collect();
+        }
+        for j in (0..joints.len()).rev() {
+            let g = by_new_head[j];
+            match joints[j].parent {
+                Some(p) => {
+                    let back = linear[p].transpose() * g;
+                    by_linear[p] += outer(g, joints[j].head - joints[p].head);
+                    by_new_head[p] += g;
+                    out.heads[p] -= back;
+                    out.heads[j] += back;
+                }
+                None => out.heads[j] += g,
+            }
+        }
+        let mut factors = vec![DVec3::ZERO; joints.len()];
+        for (j, stretch) in stretches.iter().enumerate() {
+            let g = by_linear[j];
+            match stretch {
+                Stretch::Axes(_) => factors[j] = DVec3::new(g.x_axis.x, g.y_axis.y, g.z_axis.z),
+                Stretch::Along(f) => {
+                    let bone = joints[j].tail - joints[j].head;
+                    let along = bone.normalize_or_zero();
+                    factors[j] = DVec3::splat(along.dot(g * along));
+                    let turn = (g + g.transpose()) * along * (f - 1.0);
+                    let across = turn - along * along.dot(turn);
+                    let by_bone = if along == DVec3::ZERO { DVec3::ZERO } else { across / bone.length() };
+                    out.heads[j] -= by_bone;
+                    if let Some(tail) = out.tails.get_mut(j) {
+                        *tail += by_bone;
+                    }
+                }
+            }
+        }
+        Ok((by_joint.iter().map(|(j, _)| factors[*j]).collect(), out))
+    }
+}
+
+/// By joint: how it stretches.
+fn stretches(rig: &Rig, by_joint: &[(usize, Stretch)]) -> Result<Vec<Stretch>, GeomError> {
     let mut stretches = vec![Stretch::Along(1.0); rig.joints().len()];
     for (j, stretch) in by_joint {
         let Some(place) = stretches.get_mut(*j) else {
@@ -69,6 +143,12 @@ fn maps(rig: &Rig, by_joint: &[(usize, Stretch)]) -> Result<Vec<DAffine3>, GeomE
         }
         *place = *stretch;
     }
+    Ok(stretches)
+}
+
+/// By joint: where it takes the points at rest.
+fn maps(rig: &Rig, by_joint: &[(usize, Stretch)]) -> Result<Vec<DAffine3>, GeomError> {
+    let stretches = stretches(rig, by_joint)?;
     let mut maps: Vec<DAffine3> = Vec::with_capacity(stretches.len());
     for (joint, stretch) in rig.joints().iter().zip(stretches) {
         let head = joint.parent.map_or(joint.head, |p| maps[p].transform_point3(joint.head));

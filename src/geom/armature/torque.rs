@@ -1,32 +1,45 @@
 //! The vector-Jacobian product of posing by rotation vectors, from forces on points to torques about joints: as much work as
 //! there are joints. [`Rig::transforms_vjp`] is the plain way, for any pose.
 
-use super::{Armature, JointPose, Rules, Turn};
+use super::{Armature, Influence, JointPose, Rules, Turn};
 use crate::geom::GeomError;
-use glam::{DMat3, DVec3};
+use glam::{DMat3, DVec3, Vec3};
+
+/// Derivatives of something by a body at rest.
+#[derive(Clone, Debug, Default, PartialEq)]
+pub struct RestGradient {
+    /// By each joint's head.
+    pub heads: Vec<DVec3>,
+    /// By each joint's tail.
+    pub tails: Vec<DVec3>,
+    /// By each keypoint.
+    pub keypoints: Vec<DVec3>,
+    /// By each vertex; an empty list stands for zeros.
+    pub vertices: Vec<DVec3>,
+}
 
 /// Derivatives of something by what a body is posed from.
 #[derive(Clone, Debug, PartialEq)]
 pub struct BodyGradient {
     /// By each joint's rotation vector.
     pub turns: Vec<DVec3>,
-    /// By each joint's head at rest.
-    pub heads: Vec<DVec3>,
-    /// By each keypoint's place at rest.
-    pub keypoints: Vec<DVec3>,
+    /// By the body at rest.
+    pub rest: RestGradient,
 }
 
 impl Armature {
-    /// From the derivatives by the posed keypoints. `None` for a pose with anything but rotation vectors, or scales that are
-    /// inherited.
+    /// The vector-Jacobian product of [`Armature::posed`] by rotation vectors: from the derivatives of something by the posed
+    /// keypoints and vertices (in the order of [`Armature::positions`]; none: nothing depends on them). `None` for a pose with
+    /// anything but rotation vectors, or scales that are inherited.
     ///
     /// # Errors
     /// A pose that is not finite.
-    pub fn pull_keypoints(
+    pub fn pull_posed(
         &self,
         pose: &[JointPose],
         rules: &Rules,
         by_keypoint: &[DVec3],
+        by_vertex: &[DVec3],
     ) -> Result<Option<BodyGradient>, GeomError> {
         let rig = self.rig();
         let plain = |p: &JointPose| p.location == DVec3::ZERO && p.scale == DVec3::ONE && vector(p).is_some();
@@ -37,13 +50,22 @@ impl Armature {
         let count = rig.joints().len();
         // Of everything that hangs on a joint: the sum of the derivatives (forces), and of p x g (torques about the origin).
         let (mut force, mut torque) = (vec![DVec3::ZERO; count], vec![DVec3::ZERO; count]);
-        let mut keypoints = Vec::with_capacity(by_keypoint.len());
-        for (k, g) in rig.keypoints().iter().zip(by_keypoint) {
-            let t = &transforms[k.joint];
-            force[k.joint] += *g;
-            torque[k.joint] += t.transform_point3(k.rest).cross(*g);
-            keypoints.push(t.matrix3.transpose() * *g);
-        }
+        let mut hang = |joint: usize, rest: DVec3, g: DVec3| {
+            let t = &transforms[joint];
+            force[joint] += g;
+            torque[joint] += t.transform_point3(rest).cross(g);
+            t.matrix3.transpose() * g
+        };
+        let points = rig.keypoints().iter().zip(by_keypoint);
+        let keypoints = points.map(|(k, g)| hang(k.joint, k.rest, *g)).collect();
+        let vertex = |((p, i), g): ((&Vec3, &Influence), &DVec3)| match *g {
+            DVec3::ZERO => DVec3::ZERO,
+            g => i.joints().map(|(j, w)| hang(j, p.as_dvec3(), g * w)).sum(),
+        };
+        let vertices = match by_vertex {
+            [] => Vec::new(),
+            by => self.positions().iter().zip(self.influences()).zip(by).map(vertex).collect(),
+        };
         let (mut turns, mut heads) = (vec![DVec3::ZERO; count], vec![DVec3::ZERO; count]);
         for j in (0..count).rev() {
             let joint = &rig.joints()[j];
@@ -60,7 +82,8 @@ impl Armature {
                 torque[p] += t;
             }
         }
-        Ok(Some(BodyGradient { turns, heads, keypoints }))
+        let rest = RestGradient { heads, tails: vec![DVec3::ZERO; count], keypoints, vertices };
+        Ok(Some(BodyGradient { turns, rest }))
     }
 }
 

@@ -5,6 +5,7 @@
 //! there are, what a discrete choice is. Built-ins bring their own vector-Jacobian products ([`crate::lang::builtins`]),
 //! distributions and likelihoods their gradients, supports those of their transforms.
 
+mod calls;
 mod pull;
 mod scores;
 

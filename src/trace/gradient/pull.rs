@@ -3,7 +3,6 @@
 use super::{Inputs, Reverse};
 use crate::dist::Dist;
 use crate::lang::adjoint::Adjoint;
-use crate::lang::builtins::{Args, Builtin, Derivative, Kind};
 use crate::lang::code::{DistSpec, Op, Operand};
 use crate::lang::value::Value;
 use crate::num::accumulate;
@@ -72,7 +71,7 @@ impl Reverse<'_> {
         match g.op(self.code, n) {
             Op::Prim { builtin, args } => {
                 let builtin = self.code.builtins.get(*builtin);
-                self.pull_builtin(n, frame, builtin, args, by)?;
+                self.pull_builtin(n, builtin, args, by)?;
             }
             Op::Array(items) => {
                 for (i, o) in items.iter().enumerate() {
@@ -107,10 +106,9 @@ impl Reverse<'_> {
                 }
             }
             Op::Gather => self.pull_gather(n, by)?,
+            Op::Call { .. } if self.pull_called(n, by)? => {}
             Op::Accumulator | Op::Call { .. } | Op::If { .. } | Op::Fold { .. } => match &self.inputs(n, false)[..] {
-                [one] if !matches!(g.op(self.code, n), Op::Call { .. }) || !self.is_builtin_call(n) => {
-                    self.give_node(*one, by.clone());
-                }
+                [one] => self.give_node(*one, by.clone()),
                 _ => return Err(self.no_derivative(n, "what this call gives")),
             },
             Op::Select { .. } => {
@@ -118,7 +116,7 @@ impl Reverse<'_> {
                     self.give(frame, o, by.clone());
                 }
             }
-            Op::Map { .. } => return Err(self.no_derivative(n, "what this map gives")),
+            Op::Map { .. } => self.pull_mapped(n, by)?,
             Op::Draw { dist, .. } => self.pull_realised(n, dist, by)?,
             _ => {}
         }
@@ -129,10 +127,6 @@ impl Reverse<'_> {
     fn taken(&self, n: NodeId) -> Option<Operand> {
         let Op::Select { then, otherwise, .. } = self.graph.op(self.code, n) else { return None };
         Some(if self.graph.nodes[n as usize].flags & OTHERWISE == 0 { *then } else { *otherwise })
-    }
-
-    fn is_builtin_call(&self, n: NodeId) -> bool {
-        matches!(self.graph.nodes[n as usize].side.as_deref(), Some(Side::Deps(_)))
     }
 
     fn give_part(&mut self, source: NodeId, i: usize, by: &Adjoint) {
@@ -214,55 +208,6 @@ impl Reverse<'_> {
                 _ => by.element(i),
             };
             self.give_node(self.whole(*d), part);
-        }
-        Ok(())
-    }
-
-    fn pull_builtin(
-        &mut self,
-        n: NodeId,
-        frame: FrameId,
-        builtin: &Builtin,
-        args: &[Operand],
-        by: &Adjoint,
-    ) -> Result<(), Failure> {
-        let g = self.graph;
-        let values = self.values(frame, args);
-        let a = Args { builtin, values: &values };
-        let pulled = match (builtin.kind, builtin.derivative, &g.nodes[n as usize].value) {
-            (Kind::Distribution(_), _, Value::Dist(d)) => {
-                let params = by.numbers(if let Adjoint::Array(gs) = by { gs.len() } else { 0 });
-                super::scores::by_arguments(&a, d, &params)
-            }
-            (_, Derivative::Zero, _) => return Ok(()),
-            (_, Derivative::Product(f), value) => match f(&a, value, by) {
-                Some(pulled) => pulled,
-                None => return Err(self.no_derivative(n, &format!("`{}`", builtin.full_name()))),
-            },
-            _ => return Err(self.no_derivative(n, &format!("`{}`", builtin.full_name()))),
-        };
-        self.give_arguments(n, frame, builtin, args, pulled)
-    }
-
-    /// Hands out the adjoints of a call's arguments.
-    pub(super) fn give_arguments(
-        &mut self,
-        n: NodeId,
-        frame: FrameId,
-        builtin: &Builtin,
-        args: &[Operand],
-        pulled: impl IntoIterator<Item = Adjoint>,
-    ) -> Result<(), Failure> {
-        for (i, (o, part)) in args.iter().zip(pulled).enumerate() {
-            let Some(source) = self.source(frame, *o) else { continue };
-            if !self.is_active(source) {
-                continue;
-            }
-            if part.is_unknown() {
-                let name = builtin.args.get(i).or(builtin.args.last()).map_or("", |a| a.name);
-                return Err(self.no_derivative(n, &format!("`{}` by its argument `{name}`", builtin.full_name())));
-            }
-            self.give_node(source, part);
         }
         Ok(())
     }

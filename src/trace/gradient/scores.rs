@@ -108,7 +108,7 @@ impl Reverse<'_> {
                     .enumerate()
                     .filter(|(i, _)| is_matrix(dist, *i))
                     .for_each(|(_, p)| *p = Adjoint::Zero);
-                self.give_arguments(n, frame, builtin, args, pulled)?;
+                self.give_arguments(n, builtin, args.iter().map(|o| Some(*o)), pulled)?;
             }
         }
         Ok(())

@@ -34,9 +34,11 @@ struct Filled {
 
 /// A piece of contour and what it costs, in pixels, besides the distance.
 #[derive(Debug, Clone, Copy)]
-struct Piece {
-    edge: Edge,
+pub(super) struct Piece {
+    pub edge: Edge,
     cost: f32,
+    /// The element, of rendered pieces.
+    pub index: u32,
 }
 
 /// The observed points sorted by bucket, in pixels of the frame.
@@ -73,7 +75,7 @@ impl Reverse {
                 let norm = (tx * tx + ty * ty).sqrt();
                 let (x, y) = (e.x / grid.sx, e.y / grid.sy);
                 let edge = Edge { x, y, tx: tx / norm, ty: ty / norm, half: e.half * norm, turn: e.turn };
-                Piece { edge, cost: 0.0 }
+                Piece { edge, cost: 0.0, index: 0 }
             })
             .collect();
         r.sort(&points, &mut start, &mut sorted);
@@ -114,17 +116,23 @@ impl Reverse {
         v * self.across + u
     }
 
-    /// Calls `f(length, distance)` for every observed point, in a fixed order, both in pixels. `turn` is the cost in pixels of
-    /// one channel's turn. An element partly in view costs up to a diagonal more, so that none appears suddenly. With nothing
+    /// Calls `f(length, distance, pair)` for every observed point, in a fixed order, both in pixels, with the point and the
+    /// piece it is measured to. `turn` is the cost in pixels of one channel's turn. An element partly in view costs up to a diagonal more, so that none appears suddenly. With nothing
     /// in view distances are infinite.
-    pub fn each(&self, elements: &Elements<'_>, turn: f32, scratch: &mut Scratch, mut f: impl FnMut(f32, f32)) {
+    pub fn each(
+        &self,
+        elements: &Elements<'_>,
+        turn: f32,
+        scratch: &mut Scratch,
+        mut f: impl FnMut(f32, f32, Option<[&Piece; 2]>),
+    ) {
         let Scratch { pieces, sorted, start, filled, near } = scratch;
         let diagonal = elements.diagonal() as f32;
         pieces.clear();
         pieces.extend(elements.in_view().map(|e| {
             let turn = if turn > 0.0 { channel(e.tx, e.ty) } else { 0.0 };
             let edge = Edge { x: e.x, y: e.y, tx: e.tx, ty: e.ty, half: 0.5 * e.length, turn };
-            Piece { edge, cost: (1.0 - e.weight) * diagonal }
+            Piece { edge, cost: (1.0 - e.weight) * diagonal, index: e.index as u32 }
         }));
         // Pieces reach out of their bucket by half their length, and half a pixel at the border.
         let slack = pieces.iter().map(|p| p.edge.half).fold(0.0, f32::max) + 1.0;
@@ -156,17 +164,20 @@ impl Reverse {
             near.extend(filled.iter().map(|c| (gap(c).0, c.bucket)).filter(|n| n.0 <= reach));
             near.sort_unstable_by(|a, b| a.0.total_cmp(&b.0).then(a.1.cmp(&b.1)));
             for p in points {
-                let mut best = f32::INFINITY;
+                let (mut best, mut nearest) = (f32::INFINITY, None);
                 for &(gap, c) in near.iter() {
                     if gap - slack > best {
                         break;
                     }
                     for e in &sorted[start[c as usize] as usize..start[c as usize + 1] as usize] {
                         let turned = if turn > 0.0 { turn * turn_between(e.edge.turn, p.edge.turn) } else { 0.0 };
-                        best = best.min(e.edge.distance(p.edge.x, p.edge.y) + turned + e.cost);
+                        let distance = e.edge.distance(p.edge.x, p.edge.y) + turned + e.cost;
+                        if distance < best {
+                            (best, nearest) = (distance, Some([p, e]));
+                        }
                     }
                 }
-                f(2.0 * p.edge.half * self.stands_for, best);
+                f(2.0 * p.edge.half * self.stands_for, best, nearest);
             }
         }
     }

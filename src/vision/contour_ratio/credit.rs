@@ -100,6 +100,15 @@ impl Scratch {
         }
     }
 
+    /// What a group pays for one more unit of length that would bring `score` for each.
+    pub(super) fn slope(&self, capacity: &Capacity, group: u32, score: f64) -> f64 {
+        let (Some(claim), Some(&limit)) = (self.claims.get(group as usize), capacity.limit.get(group as usize)) else {
+            return 0.0;
+        };
+        let length = claim.length as f64 / FIXED;
+        if length > limit { limit / length * (score - claim.score as f64 / FIXED / length) } else { score }
+    }
+
     /// The scores paid. Each group's is rounded to the fixed point before they are added.
     pub(super) fn settle(&self, capacity: &Capacity) -> f64 {
         let mut total = 0i64;

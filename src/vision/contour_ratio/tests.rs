@@ -192,3 +192,24 @@ fn extremes_give_numbers_or_errors() {
     let one = ContourRatio::prepare(&Pieces::new(1, 1).circle(0.5, 0.5, 0.1).map(), 1, 1, &options()).unwrap();
     assert!(one.log_likelihood(&Pieces::new(1, 1).circle(0.5, 0.5, 0.4).elements()).is_finite());
 }
+
+#[test]
+fn gradient_is_that_of_differences() {
+    let seen = clutter(128, 128, 12, 21).circle(0.5, 0.5, 0.3).map();
+    let mut drawn = Pieces::new(128, 128).circle(0.52, 0.49, 0.29);
+    drawn.push(-0.2, 50.3, 1.0, 1.0);
+    drawn.push(70.3, 128.3, 1.0, 1.0);
+    // Smooth scores, so that differences are about slopes; then too little contour, and edges that pay no more.
+    let smooth = ContourRatioOptions { sd: 3.0, truncate: 12.0, weight: 0.05, credit: 1e9, ..options() };
+    for o in [
+        smooth.clone(),
+        ContourRatioOptions { least: 1e3, ..smooth.clone() },
+        ContourRatioOptions { credit: 0.7, ..smooth },
+    ] {
+        let c = ContourRatio::prepare(&seen, 128, 128, &o).unwrap();
+        let mut out = Vec::new();
+        c.gradient(&drawn.elements(), &mut Scratch::default(), &mut out);
+        let bad = drawn.differing(&out, |e| c.log_likelihood(e));
+        assert!(bad <= out.len() / 5, "{o:?}: {bad} of {} differ", 4 * out.len());
+    }
+}

@@ -48,6 +48,16 @@ impl Urn {
         Urn { each: LnRising::new(a, most), all: LnRising::new(a * colours as f64, most) }
     }
 
+    /// How much the log-probability grows by one more pixel of a colour, for counts of that colour and of all: the mean of the last
+    /// one's and the next one's.
+    pub fn slope(&self, n: u32, all: u32) -> f64 {
+        let mean = |table: &LnRising, n: u32| match n {
+            0 => table.at(1),
+            n => 0.5 * (table.at(n + 1) - table.at(n - 1)),
+        };
+        mean(&self.each, n) - mean(&self.all, all)
+    }
+
     /// The log-probability of a sequence with these counts; 0 for an empty one.
     pub fn score(&self, counts: impl Iterator<Item = u32>) -> f64 {
         let (mut n, mut sum) = (0, 0.0);

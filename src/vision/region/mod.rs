@@ -204,6 +204,33 @@ impl Region {
         sum
     }
 
+    /// For each pixel, how much the score without shading grows if it goes over from the background to the object (every group but
+    /// 0 counts as one).
+    pub fn gains(&self, groups: &[u8]) -> Vec<f64> {
+        let k = self.colours;
+        let mut own = vec![0; self.totals.len()];
+        for (_, cell) in groups.iter().zip(&self.cells).filter(|(g, _)| **g > 0) {
+            own[*cell as usize] += 1;
+        }
+        // By cell: the gain within its tile and in the whole picture.
+        let gain = |own: &[u32], total: &[u32], power: f64| -> Vec<f64> {
+            let (inside, all) = (own.iter().sum::<u32>(), total.iter().sum::<u32>());
+            let one = |(n, t): (&u32, &u32)| {
+                power * (self.urn.slope(*n, inside) - self.urn.slope(t.saturating_sub(*n), all.saturating_sub(inside)))
+            };
+            own.iter().zip(total).map(one).collect()
+        };
+        let fold = |counts: &[u32]| {
+            let mut whole = vec![0; k];
+            counts.chunks_exact(k).for_each(|t| add(&mut whole, t));
+            whole
+        };
+        let whole = gain(&fold(&own), &fold(&self.totals), self.options.power);
+        let tiles = own.chunks_exact(k).zip(self.totals.chunks_exact(k));
+        let tiles: Vec<f64> = tiles.flat_map(|(o, t)| gain(o, t, self.options.by_tile())).collect();
+        self.cells.iter().map(|c| tiles[*c as usize] + whole[*c as usize % k]).collect()
+    }
+
     /// The whole picture's score, from the counts of the groups' colours.
     fn whole(&self, ground: &mut [u32], own: &[u32]) -> f64 {
         ground.fill(0);

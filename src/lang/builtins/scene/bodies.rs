@@ -1,14 +1,12 @@
 //! Bodies: armatures in a shape and a pose, and those made from a mesh.
 
 use super::shapes::vector_of;
-use super::{ARMATURE, AffineValue, ArmatureValue, SOLID, SolidValue, fault, native};
+use super::{ARMATURE, AffineValue, ArmatureValue, SOLID, SolidValue, body_pulls, fault, native};
 use crate::geom::armature::{Armature, JointPose, Rules, Stretch, Turn, autorig};
-use crate::lang::adjoint::Adjoint;
-use crate::lang::builtins::{Args, Builtin, Pulled, Type, arg, opt};
+use crate::lang::builtins::{Args, Builtin, Type, arg, opt};
 use crate::lang::error::Fault;
 use crate::lang::value::{Record, Value};
 use glam::{DMat3, DVec3};
-use smallvec::smallvec;
 use std::sync::Arc;
 
 const SECTION: &str = "Bodies";
@@ -41,7 +39,7 @@ pub(super) const TABLE: &[Builtin] = &[
             body.posed(&pose, &rules).map(|s| Value::object(SolidValue(s))).map_err(fault)
         },
     )
-    .pull(pull_skin),
+    .pull(body_pulls::skin),
     native(
         "shaped",
         SECTION,
@@ -66,7 +64,7 @@ pub(super) const TABLE: &[Builtin] = &[
             body.shaped(&list).map(|b| Value::object(ArmatureValue(Arc::new(b)))).map_err(fault)
         },
     )
-    .pull(pull_shaped),
+    .pull(body_pulls::shaped),
     native(
         "stretched",
         SECTION,
@@ -82,18 +80,10 @@ pub(super) const TABLE: &[Builtin] = &[
         "The armature with bones longer or shorter at rest, such as `{ thigh_l: 1.1 }`; what hangs on them moves along.",
         |a| {
             let body = armature(a)?;
-            let Value::Record(factors) = a.get(1) else { return Err(a.wrong(1, FACTORS)) };
-            let mut list = Vec::with_capacity(factors.len());
-            for (name, v) in factors.iter() {
-                let stretch = match v {
-                    Value::Num(f) => Stretch::Along(*f),
-                    v => Stretch::Axes(vector_of(v).ok_or_else(|| a.element_wrong(1, FACTORS, v))?),
-                };
-                list.push((joint(a, body, name)?, stretch));
-            }
-            body.stretched(&list).map(|b| Value::object(ArmatureValue(Arc::new(b)))).map_err(fault)
+            body.stretched(&stretches(a, body)?).map(|b| Value::object(ArmatureValue(Arc::new(b)))).map_err(fault)
         },
-    ),
+    )
+    .pull(body_pulls::stretched),
     native(
         "autorig",
         SECTION,
@@ -128,45 +118,19 @@ pub(super) const TABLE: &[Builtin] = &[
     ),
 ];
 
-/// Of poses that are one array of rotation vectors.
-fn pull_skin(a: &Args, _: &Value, by: &Adjoint) -> Option<Pulled> {
-    let body = armature(a).ok()?;
-    let Value::Array(numbers) = a.get(1) else { return None };
-    let rules = Rules { stops: stops(a, body).ok()?, inherit_scale: a.bool_or(3, false).ok()? };
-    let g = body.pull_keypoints(&pose(a, body).ok()?, &rules, &vectors(by, body.rig().keypoints().len())).ok()??;
-    let flat = |all: &[DVec3]| all.iter().flat_map(DVec3::to_array).collect::<Vec<f64>>();
-    let rest = [flat(&g.heads), flat(&g.keypoints)].concat();
-    let turns = if numbers.is_empty() { Adjoint::Zero } else { Adjoint::Array(flat(&g.turns)) };
-    Some(smallvec![Adjoint::Array(rest), turns])
-}
-
-fn pull_shaped(a: &Args, _: &Value, by: &Adjoint) -> Option<Pulled> {
-    let body = armature(a).ok()?;
-    let Value::Record(amounts) = a.get(1) else { return None };
-    let (heads, points) = (body.rig().joints().len(), body.rig().keypoints().len());
-    let all = vectors(by, heads + points);
-    let slope = |k: &Arc<str>| Some((Arc::clone(k), Adjoint::Num(body.pull_morph(k, &all[..heads], &all[heads..])?)));
-    // Offsets add up: what was there moves as before.
-    Some(smallvec![by.clone(), Adjoint::Record(amounts.keys().map(slope).collect::<Option<_>>()?)])
-}
-
-fn vectors(by: &Adjoint, n: usize) -> Vec<DVec3> {
-    by.numbers(3 * n).chunks_exact(3).map(DVec3::from_slice).collect()
-}
-
-fn armature<'a>(a: &Args<'a>) -> Result<&'a Arc<Armature>, Fault> {
+pub(super) fn armature<'a>(a: &Args<'a>) -> Result<&'a Arc<Armature>, Fault> {
     a.object::<ArmatureValue>(0, BODY).map(|v| &v.0)
 }
 
 /// The index of a joint of the argument's rig.
-fn joint(a: &Args, body: &Armature, name: &str) -> Result<usize, Fault> {
+pub(super) fn joint(a: &Args, body: &Armature, name: &str) -> Result<usize, Fault> {
     body.rig().find(name).ok_or_else(|| {
         let f = Fault::type_error(format!("{}: the rig has no joint `{name}`", a.builtin.full_name()));
         f.with_nearest(name, "it has", body.rig().joints().iter().map(|j| &*j.name))
     })
 }
 
-fn stops(a: &Args, body: &Armature) -> Result<Vec<bool>, Fault> {
+pub(super) fn stops(a: &Args, body: &Armature) -> Result<Vec<bool>, Fault> {
     let mut stops = Vec::new();
     if !a.given(2) {
         return Ok(stops);
@@ -181,7 +145,21 @@ fn stops(a: &Args, body: &Armature) -> Result<Vec<bool>, Fault> {
     Ok(stops)
 }
 
-fn pose(a: &Args, body: &Armature) -> Result<Vec<JointPose>, Fault> {
+/// How joints are stretched, in the order given.
+pub(super) fn stretches(a: &Args, body: &Armature) -> Result<Vec<(usize, Stretch)>, Fault> {
+    let Value::Record(factors) = a.get(1) else { return Err(a.wrong(1, FACTORS)) };
+    let mut list = Vec::with_capacity(factors.len());
+    for (name, v) in factors.iter() {
+        let stretch = match v {
+            Value::Num(f) => Stretch::Along(*f),
+            v => Stretch::Axes(vector_of(v).ok_or_else(|| a.element_wrong(1, FACTORS, v))?),
+        };
+        list.push((joint(a, body, name)?, stretch));
+    }
+    Ok(list)
+}
+
+pub(super) fn pose(a: &Args, body: &Armature) -> Result<Vec<JointPose>, Fault> {
     let count = body.rig().joints().len();
     match a.get(1) {
         Value::Array(xs) if xs.is_empty() => Ok(Vec::new()),

@@ -1,8 +1,10 @@
 //! Likelihoods of what is observed given a view.
 
+use super::adjoints::BySolid;
 use super::observed::{DepthValue, ImageValue, MaskValue};
 use super::{VIEW, ViewValue, native};
-use crate::lang::builtins::{Arg, Args, Builtin, Type, arg, opt};
+use crate::lang::adjoint::Adjoint;
+use crate::lang::builtins::{Arg, Args, Builtin, Pulled, Type, arg, opt};
 use crate::lang::error::Fault;
 use crate::lang::value::{Likelihood, Value};
 use crate::render::{Contours, Frame, View};
@@ -38,7 +40,8 @@ pub(super) const TABLE: &[Builtin] = &[
         Type::Likelihood,
         "The likelihood ratio of the observed contours: the object against clutter. The default for photographs.",
         contour,
-    ),
+    )
+    .pull(|_, _, by| Some(by_view(by.clone(), 6))),
     native(
         "chamfer",
         SECTION,
@@ -60,7 +63,12 @@ pub(super) const TABLE: &[Builtin] = &[
         Type::Likelihood,
         "The probabilistic chamfer distance of Kulkarni et al. 2014, section 2(c): no density over photographs.",
         chamfer,
-    ),
+    )
+    .pull(|_, _, by| {
+        let mut pulled = by_view(by.element(0), 6);
+        pulled[1] = by.element(1);
+        Some(pulled)
+    }),
     native(
         "mask",
         SECTION,
@@ -76,7 +84,8 @@ pub(super) const TABLE: &[Builtin] = &[
             let (eps_in, eps_out) = (a.num_or(1, 0.05)?, a.num_or(2, 0.05)?);
             likelihood(MaskOf { view: view(a)?, size: size(a, 3)?, eps: [eps_in, eps_out] })
         },
-    ),
+    )
+    .pull(|_, _, by| Some(by_view(by.clone(), 3))),
     native(
         "depth",
         SECTION,
@@ -94,7 +103,8 @@ pub(super) const TABLE: &[Builtin] = &[
             let options = [a.positive_or(1, 0.05)?, a.num_or(2, 0.05)?, a.num_or(3, 0.0)?, a.num_or(4, 100.0)?];
             likelihood(DepthOf { view: view(a)?, size: size(a, 5)?, options })
         },
-    ),
+    )
+    .pull(|_, _, by| Some(by_view(by.clone(), 5))),
 ];
 
 pub(super) fn likelihood(l: impl Likelihood + 'static) -> Result<Value, Fault> {
@@ -141,6 +151,21 @@ fn chamfer(a: &Args) -> Result<Value, Fault> {
     likelihood(ChamferOf { view: view(a)?, size: size(a, 6)?, options })
 }
 
+/// The adjoints of a likelihood's arguments: by the view as given, by so many others unknown.
+pub(super) fn by_view(by: Adjoint, others: usize) -> Pulled {
+    std::iter::once(by).chain((0..others).map(|_| Adjoint::Unknown)).collect()
+}
+
+/// By the view, from derivatives by the pieces of its contours.
+fn by_contours(view: &View, size: u32, by_piece: &[[f64; 4]]) -> Adjoint {
+    BySolid { landmarks: Vec::new(), vertices: view.pull_contours(size, by_piece) }.into_adjoint()
+}
+
+/// By the view, from what each pixel brings that the object covers.
+pub(super) fn by_silhouette(view: &View, size: u32, gains: &[f64]) -> Adjoint {
+    BySolid { landmarks: Vec::new(), vertices: view.pull_mask(size, gains) }.into_adjoint()
+}
+
 fn elements(c: &Contours) -> Elements<'_> {
     Elements { x: &c.x, y: &c.y, tx: &c.tx, ty: &c.ty, length: &c.length, width: c.width, height: c.height }
 }
@@ -177,19 +202,35 @@ struct ContourOf {
     options: ContourRatioOptions,
 }
 
-impl Likelihood for ContourOf {
-    fn name(&self) -> &'static str {
-        "scene.contour"
-    }
-
-    fn log_density(&self, observed: &Value) -> Result<f64, String> {
+impl ContourOf {
+    /// The comparator for what was observed, and the contours it compares.
+    fn prepared(&self, observed: &Value) -> Result<(Arc<ContourRatio>, Arc<Contours>), String> {
         let image = image(observed, &self.view, self.name())?;
         let contours = self.view.contours(self.size);
         let key = (self.options.clone(), contours.width, contours.height);
         let ratio = image.ratios.get(key, |(options, w, h)| {
             ContourRatio::prepare(image.map(), *w, *h, options).map_err(|e| format!("scene.contour: {e}"))
         })?;
+        Ok((ratio, contours))
+    }
+}
+
+impl Likelihood for ContourOf {
+    fn name(&self) -> &'static str {
+        "scene.contour"
+    }
+
+    fn log_density(&self, observed: &Value) -> Result<f64, String> {
+        let (ratio, contours) = self.prepared(observed)?;
         Ok(RATIO.with_borrow_mut(|scratch| ratio.log_likelihood_with(&elements(&contours), scratch)))
+    }
+
+    /// By the view.
+    fn gradient(&self, observed: &Value) -> Option<Adjoint> {
+        let (ratio, contours) = self.prepared(observed).ok()?;
+        let mut by_piece = Vec::new();
+        RATIO.with_borrow_mut(|scratch| ratio.gradient(&elements(&contours), scratch, &mut by_piece));
+        Some(by_contours(&self.view, self.size, &by_piece))
     }
 
     fn is_proper(&self) -> bool {
@@ -204,19 +245,36 @@ struct ChamferOf {
     options: ChamferOptions,
 }
 
-impl Likelihood for ChamferOf {
-    fn name(&self) -> &'static str {
-        "scene.chamfer"
-    }
-
-    fn log_density(&self, observed: &Value) -> Result<f64, String> {
+impl ChamferOf {
+    /// The comparator for what was observed, and the contours it compares.
+    fn prepared(&self, observed: &Value) -> Result<(Arc<Chamfer>, Arc<Contours>), String> {
         let image = image(observed, &self.view, self.name())?;
         let contours = self.view.contours(self.size);
         let key = (self.options.clone(), contours.width, contours.height);
         let chamfer = image.chamfers.get(key, |(options, w, h)| {
             Chamfer::prepare(image.map(), *w, *h, options).map_err(|e| format!("scene.chamfer: {e}"))
         })?;
+        Ok((chamfer, contours))
+    }
+}
+
+impl Likelihood for ChamferOf {
+    fn name(&self) -> &'static str {
+        "scene.chamfer"
+    }
+
+    fn log_density(&self, observed: &Value) -> Result<f64, String> {
+        let (chamfer, contours) = self.prepared(observed)?;
         Ok(CHAMFER.with_borrow_mut(|scratch| chamfer.log_likelihood_with(&elements(&contours), scratch)))
+    }
+
+    /// By the view and by sigma.
+    fn gradient(&self, observed: &Value) -> Option<Adjoint> {
+        let (chamfer, contours) = self.prepared(observed).ok()?;
+        let mut by_piece = Vec::new();
+        let by_sigma =
+            CHAMFER.with_borrow_mut(|scratch| chamfer.gradient(&elements(&contours), scratch, &mut by_piece));
+        Some(Adjoint::List(vec![by_contours(&self.view, self.size, &by_piece), Adjoint::Num(by_sigma)]))
     }
 
     fn is_proper(&self) -> bool {
@@ -266,6 +324,12 @@ impl Likelihood for MaskOf {
         };
         Some(self.prepared(observed).and_then(draw))
     }
+
+    /// By the view.
+    fn gradient(&self, observed: &Value) -> Option<Adjoint> {
+        let (prepared, _) = self.prepared(observed).ok()?;
+        Some(by_silhouette(&self.view, self.size, &prepared.gains()))
+    }
 }
 
 #[derive(Debug)]
@@ -281,7 +345,7 @@ impl DepthOf {
         let Some(depth) = observed.downcast::<DepthValue>() else {
             return Err(format!("scene.depth: the observed value must be a depth map, got {}", observed.type_name()));
         };
-        same_shape((depth.depth.width(), depth.depth.height()), &self.view, self.name())?;
+        same_shape((depth.depth.width(), depth.depth.height()), &self.view, "scene.depth")?;
         let frame = self.view.frame(self.size);
         let prepared =
             depth.prepared.get((self.options, frame.width, frame.height), |([sd, outlier, near, far], w, h)| {
@@ -313,5 +377,14 @@ impl Likelihood for DepthOf {
             Ok(Value::object(DepthValue::new(map)))
         };
         Some(self.prepared(observed).and_then(draw))
+    }
+
+    /// By the view.
+    fn gradient(&self, observed: &Value) -> Option<Adjoint> {
+        let (prepared, frame) = self.prepared(observed).ok()?;
+        let mut vertices = self.view.pull_depth(self.size, &prepared.slopes(&frame.depth));
+        let outline = self.view.pull_mask(self.size, &prepared.gains(&frame.depth));
+        vertices.iter_mut().zip(outline).for_each(|(v, o)| *v += o);
+        Some(BySolid { landmarks: Vec::new(), vertices }.into_adjoint())
     }
 }

@@ -3,6 +3,7 @@
 //! A thin layer over [`crate::vision::keypoints`]: here landmarks become positions in pixels of the picture that the
 //! detections belong to.
 
+use super::adjoints::BySolid;
 use super::compare::{SECTION, SEEN, likelihood, same_shape, view};
 use super::observed::KeypointsValue;
 use super::{ViewValue, native};
@@ -14,6 +15,7 @@ use crate::lang::value::{Likelihood, Located, Value};
 use crate::render::{Camera, View};
 use crate::rng::Stream;
 use crate::vision::keypoints::{KeypointLikelihood, KeypointOptions, matching};
+use glam::DVec3;
 use smallvec::smallvec;
 use std::sync::Arc;
 
@@ -108,19 +110,18 @@ impl Likelihood for KeypointsOf {
         all
     }
 
-    /// By the x, y and z of each landmark.
+    /// By the view.
     fn gradient(&self, observed: &Value) -> Option<Adjoint> {
         let (camera, landmarks) = (self.view.camera(), self.view.solid().landmarks());
-        let mut all = vec![0.0; 3 * landmarks.len()];
+        let mut all = vec![DVec3::ZERO; landmarks.len()];
         let add = |term: Term| {
             let Some(joint) = term.joint else { return };
             let by = term.model.gradient(term.seen, term.confidence, joint);
             let by = [by[0] * term.scale[0], by[1] * term.scale[1]];
-            let g = camera.pull_point(landmarks[term.landmark].position, by);
-            all[3 * term.landmark..].iter_mut().zip(g.to_array()).for_each(|(a, g)| *a += g);
+            all[term.landmark] += camera.pull_point(landmarks[term.landmark].position, by);
         };
         self.each(observed, add).ok()?;
-        Some(Adjoint::Array(all))
+        Some(BySolid { landmarks: all, vertices: Vec::new() }.into_adjoint())
     }
 }
 

@@ -3,13 +3,16 @@
 //! A thin layer: geometry, rendering and comparison are the business of [`crate::geom`], [`crate::render`] and
 //! [`crate::vision`]; here their values become values of the language.
 
+mod adjoints;
 mod bodies;
+mod body_pulls;
 mod compare;
 mod compare_keypoints;
 mod objects;
 mod observed;
 mod region;
 mod seeing;
+mod shape_pulls;
 mod shapes;
 
 pub use objects::{AffineValue, ArmatureValue, CameraValue, SolidValue, ViewValue};

@@ -1,5 +1,6 @@
 //! Scene values as objects of the language.
 
+use super::adjoints::BySolid;
 use crate::geom::armature::Armature;
 use crate::geom::{Affine, Solid, outer};
 use crate::lang::adjoint::Adjoint;
@@ -10,7 +11,8 @@ use glam::{DMat3, DVec3};
 use std::any::Any;
 use std::sync::Arc;
 
-/// A solid. Its adjoint: by each landmark's x, y and z in turn.
+/// A solid. Its adjoint: a list of two arrays, by each landmark's x, y and z in turn, and by those of each vertex of its meshes in
+/// turn, in world coordinates.
 #[derive(Clone, Debug)]
 pub struct SolidValue(pub Solid);
 
@@ -61,17 +63,10 @@ impl Object for AffineValue {
     fn pull_product(&self, other: &Value, by: &Adjoint) -> Option<[Adjoint; 2]> {
         let a = self.0.0;
         if let Some(s) = other.downcast::<SolidValue>() {
-            let landmarks = s.0.landmarks();
-            let by = by.numbers(3 * landmarks.len());
-            let (mut linear, mut shift) = (DMat3::ZERO, DVec3::ZERO);
-            let mut inner = Vec::with_capacity(by.len());
-            for (l, g) in landmarks.iter().zip(by.chunks_exact(3)) {
-                let (p, g) = (l.position, DVec3::from_slice(g));
-                linear += outer(g, p);
-                shift += g;
-                inner.extend((a.matrix3.transpose() * g).to_array());
-            }
-            return Some([affine_adjoint(linear, shift), Adjoint::Array(inner)]);
+            let by = BySolid::read(by, &s.0);
+            let g = s.0.pull_placed(self.0, &by.vertices, &by.landmarks);
+            let inner = BySolid { landmarks: g.landmarks, vertices: g.vertices };
+            return Some([affine_adjoint(g.linear, g.shift), inner.into_adjoint()]);
         }
         let b = other.downcast::<AffineValue>()?.0.0;
         let by = by.numbers(12);
@@ -94,7 +89,8 @@ pub(super) fn affine_adjoint(linear: DMat3, shift: DVec3) -> Adjoint {
     Adjoint::Array(linear.to_cols_array().into_iter().chain(shift.to_array()).collect())
 }
 
-/// An armature: a rig with its mesh. Its adjoint: by each joint's head at rest, then by each keypoint.
+/// An armature: a rig with its mesh. Its adjoint: a list of four arrays, by the places at rest of the joints' heads, of their tails,
+/// of the keypoints and of the vertices.
 #[derive(Clone, Debug)]
 pub struct ArmatureValue(pub Arc<Armature>);
 

@@ -1,9 +1,10 @@
 //! The likelihood of a photograph's colours given a view: `scene.region`. The arithmetic is in [`crate::vision::region`]; here the
 //! drawn frame becomes a group for each pixel.
 
-use super::compare::{SECTION, SEEN, SIZE, image, likelihood, size, view};
+use super::compare::{SECTION, SEEN, SIZE, by_silhouette, by_view, image, likelihood, size, view};
 use super::native;
 use super::observed::ImageValue;
+use crate::lang::adjoint::Adjoint;
 use crate::lang::builtins::{Args, Builtin, Type, opt};
 use crate::lang::error::Fault;
 use crate::lang::value::{Likelihood, Value};
@@ -43,7 +44,8 @@ pub(super) const TABLE: &[Builtin] = &[native(
     Type::Likelihood,
     "The likelihood ratio of the photograph's colours: inside and outside told apart, against one background. A probability of pictures in few colours only with a power of 1 for one term, 0 for the others.",
     region,
-)];
+)
+.pull(|_, _, by| Some(by_view(by.clone(), 7)))];
 
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
 enum Groups {
@@ -82,14 +84,18 @@ thread_local! {
 }
 
 impl RegionOf {
+    /// Whether only the silhouette counts.
+    fn outline(&self) -> bool {
+        self.groups == Groups::Silhouette && self.options.shading == 0.0
+    }
+
     /// The observed colours, ready at the size that is drawn, and what is drawn.
     fn prepared(&self, observed: &Value) -> Result<(Arc<Region>, Arc<Frame>), String> {
         let image = image(observed, &self.view, self.name())?;
         let Some(photo) = image.as_photo() else {
             return Err("scene.region: colours need a photograph, and only a contour map was observed".into());
         };
-        let outline = self.groups == Groups::Silhouette && self.options.shading == 0.0;
-        let frame = if outline { self.view.depth(self.size) } else { self.view.frame(self.size) };
+        let frame = if self.outline() { self.view.depth(self.size) } else { self.view.frame(self.size) };
         let key = (self.options.clone(), frame.width, frame.height);
         let region = image.regions.get(key, |(options, w, h)| {
             Region::prepare(photo, *w, *h, options).map_err(|e| format!("scene.region: {e}"))
@@ -139,6 +145,13 @@ impl Likelihood for RegionOf {
             Ok(Value::object(value))
         };
         Some(self.prepared(observed).and_then(draw))
+    }
+
+    /// By the view, where only the silhouette counts.
+    fn gradient(&self, observed: &Value) -> Option<Adjoint> {
+        let (region, frame) = self.prepared(observed).ok().filter(|_| self.outline())?;
+        let groups: Vec<u8> = frame.mask().map(u8::from).collect();
+        Some(by_silhouette(&self.view, self.size, &region.gains(&groups)))
     }
 
     fn is_proper(&self) -> bool {

@@ -1,13 +1,11 @@
 //! Shapes and placements.
 
-use super::{AFFINE, AffineValue, SOLID, SolidValue, fault, native};
+use super::{AFFINE, AffineValue, SOLID, SolidValue, fault, native, shape_pulls};
 use crate::geom::{Affine, Caps, Landmark, Profile, Solid, cuboid, lathe, sphere};
-use crate::lang::adjoint::Adjoint;
-use crate::lang::builtins::{Args, Builtin, Pulled, Type, arg, opt};
+use crate::lang::builtins::{Args, Builtin, Type, arg, opt};
 use crate::lang::error::Fault;
 use crate::lang::value::Value;
-use glam::{DMat3, DVec3};
-use smallvec::smallvec;
+use glam::DVec3;
 use std::sync::Arc;
 
 const SECTION: &str = "Shapes";
@@ -27,17 +25,11 @@ pub(super) const TABLE: &[Builtin] = &[
         SOLID,
         "Profiles stacked and swept round the y axis; a step from one to the next is closed by a ring.",
         |a| {
-            let profiles = profiles(a)?;
-            let sides = if a.given(1) { a.int_in(1, 3, 1024)? as u32 } else { 48 };
-            let caps = match a.choice(3, &["both", "bottom", "top", "none"])? {
-                "bottom" => Caps::Bottom,
-                "top" => Caps::Top,
-                "none" => Caps::None,
-                _ => Caps::Both,
-            };
-            lathe(&profiles, sides, a.num_or(2, 0.0)?, caps).map(solid).map_err(fault)
+            let Turned { profiles, sides, thickness, caps } = turned(a)?;
+            lathe(&profiles, sides, thickness, caps).map(solid).map_err(fault)
         },
-    ),
+    )
+    .pull(shape_pulls::lathe),
     native(
         "sphere",
         SECTION,
@@ -51,7 +43,8 @@ pub(super) const TABLE: &[Builtin] = &[
             let sides = if a.given(1) { a.int_in(1, 4, 1024)? as u32 } else { 32 };
             sphere(a.num(0)?, sides).map(solid).map_err(fault)
         },
-    ),
+    )
+    .pull(shape_pulls::sphere),
     native(
         "box",
         SECTION,
@@ -59,7 +52,8 @@ pub(super) const TABLE: &[Builtin] = &[
         SOLID,
         "A box round the origin.",
         |a| cuboid(vector(a, 0, DVec3::ONE)?).map(solid).map_err(fault),
-    ),
+    )
+    .pull(shape_pulls::cuboid),
     native("group", SECTION, &[arg("solids", Type::Array, "The solids.")], SOLID, "Several solids as one.", |a| {
         let n = a.get(0).len().unwrap_or(0);
         let members = (0..n).map(|i| {
@@ -71,7 +65,8 @@ pub(super) const TABLE: &[Builtin] = &[
             return Err(a.wrong(0, "an array of solids"));
         }
         Ok(Value::object(SolidValue(Solid::group(&members))))
-    }),
+    })
+    .pull(shape_pulls::group),
     native(
         "centred",
         SECTION,
@@ -85,7 +80,8 @@ pub(super) const TABLE: &[Builtin] = &[
             let s = a.object::<SolidValue>(0, "a solid")?;
             Ok(Value::object(SolidValue(s.0.centred(a.bool_or(1, false)?))))
         },
-    ),
+    )
+    .pull(shape_pulls::centred),
     native(
         "landmarks",
         SECTION,
@@ -109,7 +105,8 @@ pub(super) const TABLE: &[Builtin] = &[
             let points = a.record(1)?.iter().map(point).collect::<Result<Vec<_>, _>>()?;
             Ok(Value::object(SolidValue(s.0.clone().with_landmarks(points))))
         },
-    ),
+    )
+    .pull(shape_pulls::landmarks),
     native(
         "affine",
         SECTION,
@@ -128,37 +125,11 @@ pub(super) const TABLE: &[Builtin] = &[
             Ok(Value::object(AffineValue(placed)))
         },
     )
-    .pull(pull_affine),
+    .pull(shape_pulls::affine),
 ];
 
 fn solid(mesh: crate::geom::Mesh) -> Value {
     Value::object(SolidValue(Solid::new(Arc::new(mesh))))
-}
-
-/// Of T Rz Ry Rx S.
-fn pull_affine(a: &Args, _: &Value, by: &Adjoint) -> Option<Pulled> {
-    let (turn, scale) = (vector(a, 1, DVec3::ZERO).ok()?, vector(a, 2, DVec3::ONE).ok()?);
-    let by = by.numbers(12);
-    let (linear, shift) = (DMat3::from_cols_slice(&by[..9]), DVec3::from_slice(&by[9..]));
-    let turns = [DMat3::from_rotation_x(turn.x), DMat3::from_rotation_y(turn.y), DMat3::from_rotation_z(turn.z)];
-    let rotation = turns[2] * turns[1] * turns[0];
-    let by_scale: [f64; 3] = std::array::from_fn(|i| rotation.col(i).dot(linear.col(i)));
-    // By R: the columns of the linear part are those of R times the scale.
-    let by_rotation = DMat3::from_cols(linear.x_axis * scale.x, linear.y_axis * scale.y, linear.z_axis * scale.z);
-    let by_turn: [f64; 3] = std::array::from_fn(|i| {
-        // d R_i(angle) / d angle = [axis]x R_i.
-        let axis = DVec3::AXES[i];
-        let cross = DMat3::from_cols(axis.cross(DVec3::X), axis.cross(DVec3::Y), axis.cross(DVec3::Z));
-        let mut moved = turns;
-        moved[i] = cross * turns[i];
-        let slope = moved[2] * moved[1] * moved[0];
-        (0..3).map(|k| slope.col(k).dot(by_rotation.col(k))).sum()
-    });
-    let shaped = |i: usize, g: [f64; 3]| match a.get(i) {
-        Value::Num(_) => Adjoint::Num(g.iter().sum()),
-        _ => Adjoint::Array(g.to_vec()),
-    };
-    Some(smallvec![shaped(0, shift.to_array()), shaped(1, by_turn), shaped(2, by_scale)])
 }
 
 /// Three numbers, or one for all; a default where left out.
@@ -187,6 +158,26 @@ pub(super) fn vector_of(v: &Value) -> Option<DVec3> {
         }
         _ => None,
     }
+}
+
+/// What `lathe` is asked for.
+pub(super) struct Turned {
+    pub profiles: Vec<Profile>,
+    pub sides: u32,
+    pub thickness: f64,
+    pub caps: Caps,
+}
+
+pub(super) fn turned(a: &Args) -> Result<Turned, Fault> {
+    let profiles = profiles(a)?;
+    let sides = if a.given(1) { a.int_in(1, 3, 1024)? as u32 } else { 48 };
+    let caps = match a.choice(3, &["both", "bottom", "top", "none"])? {
+        "bottom" => Caps::Bottom,
+        "top" => Caps::Top,
+        "none" => Caps::None,
+        _ => Caps::Both,
+    };
+    Ok(Turned { profiles, sides, thickness: a.num_or(2, 0.0)?, caps })
 }
 
 /// One profile or an array of them.

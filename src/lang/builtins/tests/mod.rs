@@ -1,25 +1,30 @@
 //! Tests of the built-ins through the table, as a program calls them.
 
+mod gradients;
 mod lists;
 mod maths;
 mod operators;
 mod table;
 
-use super::{Args, Kind, Table};
+use super::{Args, Builtin, Kind, Table};
 use crate::lang::error::Fault;
 use crate::lang::value::Value;
 use std::sync::LazyLock;
 
 static TABLE: LazyLock<Table> = LazyLock::new(Table::default);
 
-/// Calls a function with arguments by position; `module.name` or `name`.
-pub(super) fn try_call(name: &str, values: &[Value]) -> Result<Value, Fault> {
+/// A built-in by `module.name` or `name`.
+pub(super) fn find(name: &str) -> &'static Builtin {
     let (module, short) = match name.split_once('.') {
         Some((m, n)) if !m.is_empty() && !n.is_empty() => (m, n),
         _ => ("", name),
     };
-    let index = TABLE.find(module, short).unwrap_or_else(|| panic!("no built-in {name}"));
-    let builtin = TABLE.get(index);
+    TABLE.get(TABLE.find(module, short).unwrap_or_else(|| panic!("no built-in {name}")))
+}
+
+/// Calls a function with arguments by position.
+pub(super) fn try_call(name: &str, values: &[Value]) -> Result<Value, Fault> {
+    let builtin = find(name);
     let order = builtin.match_names(values.iter().map(|_| None)).map_err(Fault::type_error)?;
     let values: Vec<&Value> = order.iter().map(|i| i.map_or(&Value::Unit, |i| &values[i])).collect();
     let args = Args { builtin, values: &values };

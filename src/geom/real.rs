@@ -1,10 +1,10 @@
-//! Numbers that kinematics is written for: plain doubles, and variables of a tape that gives the derivatives of the same
-//! computation in reverse. So values and gradients come from one text.
+//! Numbers that kinematics and profiles are written for: plain doubles, and variables of a tape that gives the derivatives of
+//! the same computation in reverse. So values and gradients come from one text.
 
 use std::cell::RefCell;
 use std::ops::{Add, Mul, Neg, Sub};
 
-/// What kinematics needs of a number.
+/// What is needed of a number.
 pub(super) trait Real:
     Copy + Add<Output = Self> + Sub<Output = Self> + Mul<Output = Self> + Neg<Output = Self>
 {
@@ -29,6 +29,8 @@ pub(super) trait Real:
 
     /// The angle of the direction (x, self), from -pi to pi.
     fn atan2(self, x: Self) -> Self;
+    /// The quotient.
+    fn over(self, o: Self) -> Self;
 }
 
 impl Real for f64 {
@@ -46,6 +48,10 @@ impl Real for f64 {
 
     fn atan2(self, x: f64) -> f64 {
         libm::atan2(self, x)
+    }
+
+    fn over(self, o: f64) -> f64 {
+        self / o
     }
 }
 
@@ -144,6 +150,11 @@ impl Real for Var<'_> {
         let square = self.value * self.value + x.value * x.value;
         let (dy, dx) = if square > 0.0 { (x.value / square, -self.value / square) } else { (0.0, 0.0) };
         self.tape.push(libm::atan2(self.value, x.value), [(self.index, dy), (x.index, dx)])
+    }
+
+    fn over(self, o: Self) -> Self {
+        let (q, inverse) = (self.value / o.value, 1.0 / o.value);
+        self.tape.push(q, [(self.index, inverse), (o.index, -q * inverse)])
     }
 }
 

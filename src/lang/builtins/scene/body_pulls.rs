@@ -1,0 +1,100 @@
+//! How derivatives pass through bodies: from surfaces and keypoints to poses, shapes and proportions.
+
+use super::adjoints::{BySolid, armature_adjoint, by_armature, from_points, shaped as like};
+use super::bodies::{armature, joint, pose, stops, stretches};
+use super::objects::affine_adjoint;
+use super::{AffineValue, SolidValue};
+use crate::geom::armature::{Armature, JointGradient, Rules, Stretch};
+use crate::lang::adjoint::Adjoint;
+use crate::lang::builtins::{Args, Pulled};
+use crate::lang::value::Value;
+use glam::{DMat3, DVec3};
+use smallvec::smallvec;
+use std::sync::Arc;
+
+/// Of `scene.skin`. By the armature for poses of rotation vectors only.
+pub(super) fn skin(a: &Args, posed: &Value, by: &Adjoint) -> Option<Pulled> {
+    let body = armature(a).ok()?;
+    let by = BySolid::read(by, &posed.downcast::<SolidValue>()?.0);
+    let vertices = if by.vertices.is_empty() { Vec::new() } else { body.pull_parts(&by.vertices) };
+    let rules = Rules { stops: stops(a, body).ok()?, inherit_scale: a.bool_or(3, false).ok()? };
+    let pose = pose(a, body).ok()?;
+    if let Some(g) = body.pull_posed(&pose, &rules, &by.landmarks, &vertices).ok()? {
+        let turned = |turn: DVec3| JointGradient { turn, ..JointGradient::default() };
+        let by_pose = by_pose(a, body, &g.turns.into_iter().map(turned).collect::<Vec<_>>())?;
+        return Some(smallvec![armature_adjoint(&g.rest), by_pose]);
+    }
+    let by_transform = body.transforms_gradient(&vertices, &by.landmarks);
+    let g = body.rig().transforms_vjp(&pose, &rules, &by_transform).ok()?;
+    Some(smallvec![Adjoint::Unknown, by_pose(a, body, &g)?])
+}
+
+/// In the shape that the pose was given in.
+fn by_pose(a: &Args, body: &Armature, by: &[JointGradient]) -> Option<Adjoint> {
+    Some(match a.get(1) {
+        Value::Array(xs) if xs.is_empty() => Adjoint::Zero,
+        Value::Array(_) => from_points(&by.iter().map(|g| g.turn).collect::<Vec<_>>()),
+        Value::List(all) => Adjoint::List(all.iter().zip(by).map(|(v, g)| by_joint(v, g)).collect()),
+        Value::Record(all) => {
+            let one = |(name, v): (&Arc<str>, &Value)| {
+                Some((Arc::clone(name), by_joint(v, by.get(joint(a, body, name).ok()?)?)))
+            };
+            Adjoint::Record(all.iter().map(one).collect::<Option<_>>()?)
+        }
+        _ => return None,
+    })
+}
+
+fn by_joint(v: &Value, by: &JointGradient) -> Adjoint {
+    if let Some(placement) = v.downcast::<AffineValue>() {
+        // Columns s_k R_k: they grow with the scale, and turn with a small rotation vector w by w x s_k R_k.
+        let m = placement.0.0.matrix3;
+        let column = |c: DVec3, by_scale: f64| {
+            let scale = c.length();
+            c * (by_scale / scale) + by.turn.cross(c) * (0.5 / (scale * scale))
+        };
+        let [x, y, z] = by.scale.to_array();
+        let linear = DMat3::from_cols(column(m.x_axis, x), column(m.y_axis, y), column(m.z_axis, z));
+        return affine_adjoint(linear, by.location);
+    }
+    match v {
+        Value::Record(fields) => {
+            let one = |(name, v): (&Arc<str>, &Value)| {
+                let g = match &**name {
+                    "location" => by.location,
+                    "scale" => by.scale,
+                    _ => by.turn,
+                };
+                (Arc::clone(name), like(v, g))
+            };
+            Adjoint::Record(fields.iter().map(one).collect())
+        }
+        v => like(v, by.turn),
+    }
+}
+
+/// Of `scene.shaped`: offsets add up, so what was there moves as before.
+pub(super) fn shaped(a: &Args, _: &Value, by: &Adjoint) -> Option<Pulled> {
+    let body = armature(a).ok()?;
+    let Value::Record(amounts) = a.get(1) else { return None };
+    let rest = by_armature(by, body);
+    let slope = |k: &Arc<str>| Some((Arc::clone(k), Adjoint::Num(body.pull_morph(k, &rest)?)));
+    Some(smallvec![by.clone(), Adjoint::Record(amounts.keys().map(slope).collect::<Option<_>>()?)])
+}
+
+/// Of `scene.stretched`.
+pub(super) fn stretched(a: &Args, _: &Value, by: &Adjoint) -> Option<Pulled> {
+    let body = armature(a).ok()?;
+    let Value::Record(factors) = a.get(1) else { return None };
+    let list = stretches(a, body).ok()?;
+    let (by_factor, rest) = body.pull_stretched(&list, &by_armature(by, body)).ok()?;
+    let mut by_factors = Vec::with_capacity(list.len());
+    for (((name, v), (_, stretch)), g) in factors.iter().zip(&list).zip(by_factor) {
+        let by = match stretch {
+            Stretch::Along(_) => Adjoint::Num(g.x),
+            Stretch::Axes(_) => like(v, g),
+        };
+        by_factors.push((Arc::clone(name), by));
+    }
+    Some(smallvec![armature_adjoint(&rest), Adjoint::Record(by_factors)])
+}

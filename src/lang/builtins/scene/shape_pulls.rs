@@ -1,0 +1,120 @@
+//! How derivatives pass through shapes and placements: from the vertices of surfaces and named points to sizes and profiles.
+
+use super::SolidValue;
+use super::adjoints::{BySolid, shaped};
+use super::shapes::{Turned, turned, vector};
+use crate::geom::{Mesh, Profile, Solid, pull_cuboid, pull_lathe, pull_sphere};
+use crate::lang::adjoint::Adjoint;
+use crate::lang::builtins::{Args, Pulled};
+use crate::lang::value::Value;
+use glam::{DMat3, DVec3};
+use smallvec::smallvec;
+use std::sync::Arc;
+
+/// A shape's mesh and the derivatives by its vertices; `None` where nothing depends on them.
+fn surface<'a>(made: &'a Value, by: &Adjoint) -> Option<(&'a Mesh, Vec<DVec3>)> {
+    let solid = &made.downcast::<SolidValue>()?.0;
+    let vertices = BySolid::read(by, solid).vertices;
+    (!vertices.is_empty()).then_some((&solid.instances().first()?.mesh, vertices))
+}
+
+/// Of `scene.lathe`.
+pub(super) fn lathe(a: &Args, made: &Value, by: &Adjoint) -> Option<Pulled> {
+    let Some((_, by_vertex)) = surface(made, by) else { return Some(Pulled::new()) };
+    let Turned { profiles, sides, thickness, caps } = turned(a).ok()?;
+    let g = pull_lathe(&profiles, sides, thickness, caps, &by_vertex).ok()?;
+    let parts = match a.get(0) {
+        Value::List(all) => Adjoint::List(all.iter().zip(&g.profiles).map(|(v, g)| profile(v, g)).collect()),
+        one => g.profiles.first().map_or(Adjoint::Zero, |g| profile(one, g)),
+    };
+    Some(smallvec![parts, Adjoint::Zero, Adjoint::Num(g.thickness)])
+}
+
+/// In the shape of a profile's record.
+fn profile(v: &Value, by: &Profile) -> Adjoint {
+    let Value::Record(fields) = v else { return Adjoint::Zero };
+    let one = |(name, v): (&Arc<str>, &Value)| {
+        let all = if **name == *"y" { &by.y } else { &by.r };
+        let by = match v {
+            // One radius for all heights.
+            Value::Num(_) => Adjoint::Num(all.iter().sum()),
+            Value::Array(xs) if xs.len() < all.len() => Adjoint::Array(vec![all.iter().sum()]),
+            _ => Adjoint::Array(all.clone()),
+        };
+        (Arc::clone(name), by)
+    };
+    Adjoint::Record(fields.iter().filter(|(name, _)| matches!(&***name, "y" | "r")).map(one).collect())
+}
+
+/// Of `scene.sphere`.
+pub(super) fn sphere(a: &Args, made: &Value, by: &Adjoint) -> Option<Pulled> {
+    let Some((mesh, by_vertex)) = surface(made, by) else { return Some(Pulled::new()) };
+    Some(smallvec![Adjoint::Num(pull_sphere(a.num(0).ok()?, mesh, &by_vertex))])
+}
+
+/// Of `scene.box`.
+pub(super) fn cuboid(a: &Args, made: &Value, by: &Adjoint) -> Option<Pulled> {
+    let Some((mesh, by_vertex)) = surface(made, by) else { return Some(Pulled::new()) };
+    let by_size = pull_cuboid(vector(a, 0, DVec3::ONE).ok()?, mesh, &by_vertex);
+    Some(smallvec![shaped(a.get(0), by_size)])
+}
+
+/// Of `scene.group`: what is one after the other goes to its members.
+pub(super) fn group(a: &Args, made: &Value, by: &Adjoint) -> Option<Pulled> {
+    let BySolid { landmarks, vertices } = BySolid::read(by, &made.downcast::<SolidValue>()?.0);
+    let (mut landmarks, mut vertices) = (&landmarks[..], &vertices[..]);
+    let next = |rest: &mut &[DVec3], n: usize| {
+        let (own, after) = rest.split_at(n.min(rest.len()));
+        *rest = after;
+        own.to_vec()
+    };
+    let one = |i: usize| {
+        let member = a.get(0).element(i)?;
+        let solid = &member.downcast::<SolidValue>()?.0;
+        let own = BySolid {
+            landmarks: next(&mut landmarks, solid.landmarks().len()),
+            vertices: if vertices.is_empty() { Vec::new() } else { next(&mut vertices, solid.vertex_count()) },
+        };
+        Some(own.into_adjoint())
+    };
+    Some(smallvec![Adjoint::List((0..a.get(0).len()?).map(one).collect::<Option<_>>()?)])
+}
+
+/// Of `scene.centred`: the box goes with the vertices at its sides.
+pub(super) fn centred(a: &Args, made: &Value, by: &Adjoint) -> Option<Pulled> {
+    let by = BySolid::read(by, &made.downcast::<SolidValue>()?.0);
+    let solid: &Solid = &a.object::<SolidValue>(0, "a solid").ok()?.0;
+    let (vertices, landmarks) = solid.pull_centred(a.bool_or(1, false).ok()?, &by.vertices, &by.landmarks);
+    Some(smallvec![BySolid { landmarks, vertices }.into_adjoint()])
+}
+
+/// Of `scene.landmarks`.
+pub(super) fn landmarks(a: &Args, made: &Value, by: &Adjoint) -> Option<Pulled> {
+    let BySolid { landmarks, vertices } = BySolid::read(by, &made.downcast::<SolidValue>()?.0);
+    let own = a.record(1).ok()?.keys().zip(landmarks);
+    let by_points = own.map(|(name, g)| (Arc::clone(name), Adjoint::Array(g.to_array().to_vec()))).collect();
+    Some(smallvec![BySolid { vertices, ..BySolid::default() }.into_adjoint(), Adjoint::Record(by_points)])
+}
+
+/// Of `scene.affine`, T Rz Ry Rx S.
+pub(super) fn affine(a: &Args, _: &Value, by: &Adjoint) -> Option<Pulled> {
+    let (turn, scale) = (vector(a, 1, DVec3::ZERO).ok()?, vector(a, 2, DVec3::ONE).ok()?);
+    let by = by.numbers(12);
+    let (linear, shift) = (DMat3::from_cols_slice(&by[..9]), DVec3::from_slice(&by[9..]));
+    let turns = [DMat3::from_rotation_x(turn.x), DMat3::from_rotation_y(turn.y), DMat3::from_rotation_z(turn.z)];
+    let rotation = turns[2] * turns[1] * turns[0];
+    let by_scale: [f64; 3] = std::array::from_fn(|i| rotation.col(i).dot(linear.col(i)));
+    // By R: the columns of the linear part are those of R times the scale.
+    let by_rotation = DMat3::from_cols(linear.x_axis * scale.x, linear.y_axis * scale.y, linear.z_axis * scale.z);
+    let by_turn: [f64; 3] = std::array::from_fn(|i| {
+        // d R_i(angle) / d angle = [axis]x R_i.
+        let axis = DVec3::AXES[i];
+        let cross = DMat3::from_cols(axis.cross(DVec3::X), axis.cross(DVec3::Y), axis.cross(DVec3::Z));
+        let mut moved = turns;
+        moved[i] = cross * turns[i];
+        let slope = moved[2] * moved[1] * moved[0];
+        (0..3).map(|k| slope.col(k).dot(by_rotation.col(k))).sum()
+    });
+    let like = |i: usize, g: DVec3| shaped(a.get(i), g);
+    Some(smallvec![like(0, shift), like(1, by_turn.into()), like(2, by_scale.into())])
+}

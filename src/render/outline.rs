@@ -1,0 +1,106 @@
+//! How a silhouette moves with the surface: sums over the pixels that a solid covers, by its vertices.
+//!
+//! Where the outline moves outward it takes in what lies beside it, as much as its length times its motion. Pixels are in or
+//! out, so this is the slope of a sum whose steps are evened out, not of the steps. The outline is taken from the contours: where a
+//! coarse mesh reaches pixels beyond its smooth silhouette, that piece of it is missed.
+
+use super::{Contours, View};
+use glam::DVec3;
+
+/// How far beside a piece to look for the background, in pixels.
+const BESIDE: f64 = 1.2;
+
+impl View {
+    /// The derivatives of the sum of `gain` over the pixels that show the solid, in the picture whose longer side has `size` pixels,
+    /// by each vertex of the solid's meshes in turn, in world coordinates. `gain` has a number for each pixel, row by row.
+    pub fn pull_mask(&self, size: u32, gain: &[f64]) -> Vec<DVec3> {
+        // Drawn before the contours, which then use it.
+        let frame = self.depth(size);
+        let contours = self.contours(size);
+        let by_piece: Vec<[f64; 4]> = (0..contours.len())
+            .map(|i| {
+                let Some([nx, ny]) = outward(&contours, &frame.depth, i) else { return [0.0; 4] };
+                let (x, y) = (f64::from(contours.x[i]), f64::from(contours.y[i]));
+                let by = f64::from(contours.length[i]) * between(gain, contours.width, contours.height, x, y);
+                [by * nx, by * ny, 0.0, 0.0]
+            })
+            .collect();
+        contours.pull(self.solid(), &self.camera().scaled_to(size), &by_piece)
+    }
+}
+
+/// The direction to the background, if piece `i` is of the outline.
+fn outward(c: &Contours, depth: &[f32], i: usize) -> Option<[f64; 2]> {
+    let [x, y, tx, ty] = [&c.x, &c.y, &c.tx, &c.ty].map(|list| f64::from(list[i]));
+    let shown = |sign: f64| {
+        let (u, v) = (x + sign * BESIDE * ty, y - sign * BESIDE * tx);
+        let inside = u >= 0.0 && v >= 0.0 && u < f64::from(c.width) && v < f64::from(c.height);
+        inside.then(|| depth.get(v as usize * c.width as usize + u as usize).is_some_and(|d| d.is_finite()))
+    };
+    match (shown(1.0)?, shown(-1.0)?) {
+        (false, true) => Some([ty, -tx]),
+        (true, false) => Some([-ty, tx]),
+        _ => None,
+    }
+}
+
+/// The bilinear value between pixels' centres.
+fn between(values: &[f64], width: u32, height: u32, x: f64, y: f64) -> f64 {
+    let (w, h) = (width as usize, height as usize);
+    let (u, v) = ((x - 0.5).clamp(0.0, (w - 1) as f64), (y - 0.5).clamp(0.0, (h - 1) as f64));
+    let (u0, v0) = (u as usize, v as usize);
+    let at = |u: usize, v: usize| values.get(v.min(h - 1) * w + u.min(w - 1)).copied().unwrap_or(0.0);
+    let (fu, fv) = (u - u0 as f64, v - v0 as f64);
+    let row = |v: usize| at(u0, v) + fu * (at(u0 + 1, v) - at(u0, v));
+    row(v0) + fv * (row(v0 + 1) - row(v0))
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+    use crate::geom::Affine;
+    use crate::render::Camera;
+    use crate::render::testing::{cuboid, sphere};
+    use glam::Vec3;
+
+    #[test]
+    fn sums_over_silhouettes_change_as_predicted() {
+        const SIZE: u32 = 192;
+        // A smooth gain, and pictures coarse enough that a difference of some pixels tells the slope.
+        let gain: Vec<f64> = (0..SIZE * SIZE)
+            .map(|i| {
+                let (x, y) = (f64::from(i % SIZE), f64::from(i / SIZE));
+                1.0 + 0.01 * x + 0.005 * y + 0.5 * libm::sin(x / 30.0)
+            })
+            .collect();
+        let block = cuboid(Vec3::new(1.4, 1.0, 0.8));
+        for solid in [sphere(64, 32), block] {
+            let at = |p: &[f64; 5]| {
+                let turn = DVec3::new(0.4 + p[2], 0.5 + p[3], 0.2);
+                let by = Affine::new(DVec3::new(p[0], p[1], 0.0), turn, DVec3::splat(1.0 + p[4]));
+                View::new(solid.placed(by), Camera::default_for(SIZE, SIZE))
+            };
+            let sum = |p: &[f64; 5]| {
+                let frame = at(p).depth(SIZE);
+                frame.mask().zip(&gain).map(|(m, g)| if m { *g } else { 0.0 }).sum::<f64>()
+            };
+            let here = [0.05, -0.1, 0.0, 0.0, 0.0];
+            let found = at(&here).pull_mask(SIZE, &gain);
+            let vertices = |p: &[f64; 5]| at(p).solid().vertices().collect::<Vec<_>>();
+            for k in 0..5 {
+                let moved = |h: f64| {
+                    let mut p = here;
+                    p[k] += h;
+                    p
+                };
+                let way = vertices(&moved(1e-6)).into_iter().zip(vertices(&moved(-1e-6))).map(|(a, b)| (a - b) / 2e-6);
+                let terms: Vec<f64> = found.iter().zip(way).map(|(g, d)| g.dot(d)).collect();
+                let (along, gross) = (terms.iter().sum::<f64>(), terms.iter().map(|t| t.abs()).sum::<f64>());
+                let slope = (sum(&moved(0.04)) - sum(&moved(-0.04))) / 0.08;
+                // What is gained on one side is mostly lost on the other. Pixels are in or out: of the outline's 300, some 20 more or
+                // fewer by chance, each bringing about 1 to 3, over a difference of 0.08.
+                assert!((along - slope).abs() < 0.03 * gross + 400.0, "number {k}: {along} {slope} of {gross}");
+            }
+        }
+    }
+}

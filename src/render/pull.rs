@@ -1,0 +1,155 @@
+//! How contours move with the surface: from derivatives by their pieces to derivatives by the vertices.
+//!
+//! A piece moves as the points of the surface do that make its segment: for creases that is exact, for silhouettes to first
+//! order and at right angles to the contour, which is what counts. Which pieces are seen is taken as it is. Nothing is drawn:
+//! the pieces of the meshes are traced again, and those that were seen are told by their numbers.
+
+use super::project::{Lens, Placement, project_mesh};
+use super::trace::{Origin, trace_mesh};
+use super::visibility::Piece;
+use super::{Camera, Contours};
+use crate::geom::{Instance, Solid};
+use glam::DVec3;
+
+impl Contours {
+    /// The vector-Jacobian product of [`Contours::of`] for the same solid and camera: from the derivatives of something by each
+    /// piece's x, y, length (pixels) and angle (radians, from right to down) to those by each vertex of the solid's meshes in
+    /// turn, in world coordinates. Pieces beyond the end of `by_piece` count as 0.
+    pub fn pull(&self, solid: &Solid, camera: &Camera, by_piece: &[[f64; 4]]) -> Vec<DVec3> {
+        let mut out = vec![DVec3::ZERO; solid.vertex_count()];
+        self.origins(solid, camera, |i, instance, base, origin| {
+            if let (Some(by), Some(own)) = (by_piece.get(i), out.get_mut(base..)) {
+                pull_piece(instance, camera, origin, by, own);
+            }
+        });
+        out
+    }
+
+    /// Calls `f` for each piece with its instance, that one's first vertex among all, and where the piece comes from.
+    fn origins(&self, solid: &Solid, camera: &Camera, mut f: impl FnMut(usize, &Instance, usize, &Origin)) {
+        let (mut points, mut facing) = (Vec::new(), Vec::new());
+        let (mut next, mut base) = (0, 0);
+        for instance in solid.instances() {
+            let placement = Placement::new(camera, &instance.affine);
+            points.clear();
+            project_mesh(&instance.mesh, &placement, &Lens::new(camera), &mut points);
+            trace_mesh(&instance.mesh, &placement, camera, &points, &mut facing, |piece, origin| {
+                if self.is(next, &piece) {
+                    f(next, instance, base, origin);
+                    next += 1;
+                }
+            });
+            base += points.len();
+        }
+    }
+
+    /// Whether piece `i` is this one.
+    fn is(&self, i: usize, piece: &Piece) -> bool {
+        let same = |list: &[f32], x: f32| list.get(i).is_some_and(|y| y.to_bits() == x.to_bits());
+        same(&self.x, piece.x)
+            && same(&self.y, piece.y)
+            && same(&self.tx, piece.tx)
+            && same(&self.ty, piece.ty)
+            && same(&self.length, piece.length)
+    }
+}
+
+fn pull_piece(
+    instance: &Instance,
+    camera: &Camera,
+    origin: &Origin,
+    &[gx, gy, by_length, by_angle]: &[f64; 4],
+    out: &mut [DVec3],
+) {
+    let corners = origin.corners.map(|v| instance.mesh.positions.get(v as usize));
+    let [Some(p), Some(q), Some(r)] = corners else { return };
+    let ends =
+        origin.ends.map(|[a, b, c]| instance.affine.point(p.as_dvec3() * a + q.as_dvec3() * b + r.as_dvec3() * c));
+    let [(ax, ay, a_depth), (bx, by, b_depth)] = ends.map(|e| camera.project(e));
+    let (dx, dy) = (bx - ax, by - ay);
+    let length = (dx * dx + dy * dy).sqrt();
+    // A segment cut by the near plane has other ends.
+    if !(a_depth >= Camera::NEAR && b_depth >= Camera::NEAR && length > 1e-9) {
+        return;
+    }
+    let (tx, ty) = (dx / length, dy / length);
+    let (stretch, turn) = (by_length * origin.share, by_angle / length);
+    let along = [stretch * tx - turn * ty, stretch * ty + turn * tx];
+    let by_end = [(1.0 - origin.at, -1.0), (origin.at, 1.0)];
+    for ((end, shares), (share, sign)) in ends.into_iter().zip(origin.ends).zip(by_end) {
+        let g = camera.pull_point(end, [share * gx + sign * along[0], share * gy + sign * along[1]]);
+        if !g.is_finite() {
+            continue;
+        }
+        for (v, share) in origin.corners.into_iter().zip(shares) {
+            if let Some(place) = out.get_mut(v as usize) {
+                *place += g * share;
+            }
+        }
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+    use crate::geom::Affine;
+    use crate::render::testing::{Uniform, cuboid, lathe, sphere};
+    use glam::Vec3;
+
+    /// Numbers of a piece in double precision, from the vertices in world coordinates.
+    fn piece(camera: &Camera, vertices: &[DVec3], base: usize, o: &Origin) -> [f64; 4] {
+        let ends = o.ends.map(|w| {
+            let at = o.corners.iter().zip(w).map(|(v, w)| vertices[base + *v as usize] * w).sum::<DVec3>();
+            camera.project(at)
+        });
+        let (dx, dy) = (ends[1].0 - ends[0].0, ends[1].1 - ends[0].1);
+        let at = [ends[0].0 + o.at * dx, ends[0].1 + o.at * dy];
+        [at[0], at[1], dx.hypot(dy) * o.share, dy.atan2(dx)]
+    }
+
+    #[test]
+    fn derivatives_are_those_of_differences_for_the_same_pieces() {
+        let place = |x: f64, turn: f64| Affine::new(DVec3::new(x, 0.1, -0.3), DVec3::new(turn, 0.4, 0.2), DVec3::ONE);
+        let vase = lathe(&[(0.3, -0.8), (0.7, -0.2), (0.4, 0.5), (0.6, 0.9)], 24, true);
+        let group = Solid::group(&[
+            vase.placed(place(-0.8, 0.3)),
+            sphere(20, 12).placed(place(0.9, 0.0)),
+            cuboid(Vec3::new(0.8, 1.1, 0.6)).placed(place(0.2, -0.7)),
+        ]);
+        let mut parallel = Camera::default_for(96, 80);
+        parallel.projection = crate::render::Projection::Orthographic { units_per_pixel: 0.04, cx: 47.0, cy: 41.0 };
+        for camera in [Camera::default_for(96, 80), parallel] {
+            let contours = Contours::of(&group, &camera);
+            let mut rng = Uniform(3);
+            // Angles count by length: those of short pieces turn fast.
+            let one = |length: &f32| [1.0, 1.0, 1.0, f64::from(*length)].map(|by| by * (rng.next() - 0.5));
+            let by: Vec<[f64; 4]> = contours.length.iter().map(one).collect();
+            let found = contours.pull(&group, &camera, &by);
+            let mut origins = Vec::new();
+            contours.origins(&group, &camera, |i, _, base, o| origins.push((i, base, *o)));
+            assert!(origins.iter().map(|o| o.0).eq(0..contours.len()), "every piece was found again");
+            let vertices: Vec<DVec3> = group.vertices().collect();
+            for (i, base, o) in &origins {
+                let [x, y, length, _] = piece(&camera, &vertices, *base, o);
+                let (cx, cy) = (f64::from(contours.x[*i]), f64::from(contours.y[*i]));
+                assert!((x - cx).abs() < 1e-3 && (y - cy).abs() < 1e-3);
+                assert!((length - f64::from(contours.length[*i])).abs() < 1e-3);
+            }
+            let sum = |vertices: &[DVec3]| -> f64 {
+                let one = |(i, base, o): &(usize, usize, Origin)| {
+                    piece(&camera, vertices, *base, o).iter().zip(by[*i]).map(|(x, g)| x * g).sum::<f64>()
+                };
+                origins.iter().map(one).sum()
+            };
+            for _ in 0..20 {
+                let way: Vec<DVec3> =
+                    vertices.iter().map(|_| DVec3::from_array(std::array::from_fn(|_| rng.next() - 0.5))).collect();
+                let moved = |h: f64| vertices.iter().zip(&way).map(|(p, d)| *p + *d * h).collect::<Vec<_>>();
+                let slope = (sum(&moved(1e-6)) - sum(&moved(-1e-6))) / 2e-6;
+                let along: f64 = found.iter().zip(&way).map(|(g, d)| g.dot(*d)).sum();
+                let scale: f64 = found.iter().zip(&way).map(|(g, d)| g.dot(*d).abs()).sum();
+                assert!((along - slope).abs() < 1e-5 * scale, "{along} {slope}");
+            }
+        }
+    }
+}

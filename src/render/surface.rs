@@ -1,0 +1,62 @@
+//! How depth moves with the surface: from derivatives by the depth at each pixel to derivatives by the vertices.
+//!
+//! At a pixel the depth is where its line of sight meets the plane of the face that is seen; which face that is, is taken as it
+//! is. The motion of the outline is the business of [`View::pull_mask`].
+
+use super::View;
+use super::project::project;
+use super::raster::{each_triangle, empty};
+use glam::DVec3;
+
+impl View {
+    /// The derivatives by each vertex of the solid's meshes in turn, in world coordinates, from those by the depth at each pixel,
+    /// row by row, of the picture whose longer side has `size` pixels. What is not seen counts as 0.
+    pub fn pull_depth(&self, size: u32, by_depth: &[f64]) -> Vec<DVec3> {
+        let (solid, camera) = (self.solid(), self.camera().scaled_to(size));
+        let mut points = Vec::new();
+        project(solid, &camera, &mut points);
+        let mut nearest = vec![empty(&camera); camera.pixels()];
+        let mut faces: Vec<Option<(usize, usize)>> = vec![None; camera.pixels()];
+        each_triangle(solid, &camera, &points, |triangle, source| {
+            let [lo, hi] = triangle.limits;
+            triangle.runs(camera.width, camera.height, |run| {
+                for column in run.from..run.to {
+                    let i = run.row * camera.width as usize + column;
+                    let q = (run.nearness + run.step * (column - run.from) as f32).max(lo).min(hi);
+                    if let (Some(at), Some(face)) = (nearest.get_mut(i), faces.get_mut(i))
+                        && q > *at
+                    {
+                        (*at, *face) = (q, Some((source.instance, source.face)));
+                    }
+                }
+            });
+        });
+        let first = |n: usize| solid.instances()[..n].iter().map(|i| i.mesh.positions.len()).sum::<usize>();
+        let firsts: Vec<usize> = (0..solid.instances().len()).map(first).collect();
+        let mut out = vec![DVec3::ZERO; solid.vertex_count()];
+        for (i, (face, by)) in faces.iter().zip(by_depth).enumerate() {
+            let Some((instance, face)) = face.filter(|_| *by != 0.0) else { continue };
+            let (x, y) = (i % camera.width as usize, i / camera.width as usize);
+            let (x, y) = (x as f64 + 0.5, y as f64 + 0.5);
+            let start = camera.unproject(x, y, 0.0);
+            let ray = camera.unproject(x, y, 1.0) - start;
+            let item = &solid.instances()[instance];
+            let corners = item.mesh.topology.triangles[face];
+            let [a, b, c] = corners.map(|v| item.affine.point(item.mesh.positions[v as usize].as_dvec3()));
+            let normal = (b - a).cross(c - a);
+            let slope = normal / normal.dot(ray);
+            let hit = start + ray * slope.dot(a - start);
+            // The shares of the corners at the point that is seen.
+            let area = normal.length_squared();
+            let share = |p: DVec3, q: DVec3| (p - hit).cross(q - hit).dot(normal) / area;
+            let g = slope * *by;
+            if !g.is_finite() {
+                continue;
+            }
+            for (v, share) in corners.into_iter().zip([share(b, c), share(c, a), share(a, b)]) {
+                out[firsts[instance] + v as usize] += g * share;
+            }
+        }
+        out
+    }
+}

@@ -1,0 +1,110 @@
+//! How derivatives pass through calls of built-ins: written as such, called as values, mapped over elements.
+
+use super::{Reverse, scores};
+use crate::lang::adjoint::Adjoint;
+use crate::lang::builtins::{Args, Builtin, Derivative, Kind, Pulled};
+use crate::lang::code::{Callee, Op, Operand};
+use crate::lang::value::Value;
+use crate::trace::demand::Failure;
+use crate::trace::node::*;
+use smallvec::SmallVec;
+
+impl Reverse<'_> {
+    /// A call written as such.
+    pub(super) fn pull_builtin(
+        &mut self,
+        n: NodeId,
+        builtin: &Builtin,
+        args: &[Operand],
+        by: &Adjoint,
+    ) -> Result<(), Failure> {
+        let values = self.values(self.graph.nodes[n as usize].frame, args);
+        let pulled = self.by_call(n, &Args { builtin, values: &values }, &self.graph.nodes[n as usize].value, by)?;
+        self.give_arguments(n, builtin, args.iter().map(|o| Some(*o)), pulled)
+    }
+
+    /// A call of a built-in that is a value; false if the node is none.
+    pub(super) fn pull_called(&mut self, n: NodeId, by: &Adjoint) -> Result<bool, Failure> {
+        let g = self.graph;
+        let frame = g.nodes[n as usize].frame;
+        let Op::Call { callee: Callee::Value(f), args, .. } = g.op(self.code, n) else { return Ok(false) };
+        let Value::Builtin(i) = g.value(self.code, frame, *f) else { return Ok(false) };
+        let builtin = self.code.builtins.get(*i);
+        // It was matched when it was called.
+        let Ok(order) = builtin.match_names(args.iter().map(|(k, _)| k.as_deref())) else { return Ok(false) };
+        let operands: SmallVec<[Option<Operand>; 8]> =
+            order.iter().map(|i| i.and_then(|i| args.get(i)).map(|a| a.1)).collect();
+        let mut deps = Deps::new();
+        let value = |o: &Option<Operand>| o.map_or(&Value::Unit, |o| g.plain(self.code, frame, o, &mut deps));
+        let values: SmallVec<[&Value; 8]> = operands.iter().map(value).collect();
+        let pulled = self.by_call(n, &Args { builtin, values: &values }, &g.nodes[n as usize].value, by)?;
+        self.give_arguments(n, builtin, operands, pulled)?;
+        Ok(true)
+    }
+
+    /// A built-in applied to each element.
+    pub(super) fn pull_mapped(&mut self, n: NodeId, by: &Adjoint) -> Result<(), Failure> {
+        let g = self.graph;
+        let frame = g.nodes[n as usize].frame;
+        let Op::Map { f, over, .. } = g.op(self.code, n) else { return Ok(()) };
+        let Value::Builtin(i) = g.value(self.code, frame, *f) else {
+            return Err(self.no_derivative(n, "what this map gives"));
+        };
+        let builtin = self.code.builtins.get(*i);
+        let (xs, ys) = (g.plain(self.code, frame, *over, &mut Deps::new()), &g.nodes[n as usize].value);
+        let mut whole = Adjoint::Zero;
+        for i in 0..xs.len().unwrap_or(0) {
+            let (x, y, by) = match (xs, ys) {
+                (Value::Record(x), Value::Record(y)) => match (x.get_index(i), y.get_index(i)) {
+                    (Some((_, x)), Some((name, y))) => (x.clone(), y.clone(), by.field(name)),
+                    _ => continue,
+                },
+                _ => (xs.element(i).unwrap_or_default(), ys.element(i).unwrap_or_default(), by.element(i)),
+            };
+            if by.is_zero() {
+                continue;
+            }
+            let pulled = self.by_call(n, &Args { builtin, values: &[&x] }, &y, &by)?;
+            whole.add_position(xs, i, pulled.into_iter().next().unwrap_or_default());
+        }
+        self.give(frame, *over, whole);
+        Ok(())
+    }
+
+    /// The adjoints of a call's arguments.
+    fn by_call(&self, n: NodeId, a: &Args, value: &Value, by: &Adjoint) -> Result<Pulled, Failure> {
+        let unknown = || self.no_derivative(n, &format!("`{}`", a.builtin.full_name()));
+        match (a.builtin.kind, a.builtin.derivative, value) {
+            (Kind::Distribution(_), _, Value::Dist(d)) => {
+                let params = by.numbers(if let Adjoint::Array(gs) = by { gs.len() } else { 0 });
+                Ok(scores::by_arguments(a, d, &params))
+            }
+            (_, Derivative::Zero, _) => Ok(Pulled::new()),
+            (_, Derivative::Product(f), value) => f(a, value, by).ok_or_else(unknown),
+            _ => Err(unknown()),
+        }
+    }
+
+    /// Hands out the adjoints of a call's arguments.
+    pub(super) fn give_arguments(
+        &mut self,
+        n: NodeId,
+        builtin: &Builtin,
+        args: impl IntoIterator<Item = Option<Operand>>,
+        pulled: impl IntoIterator<Item = Adjoint>,
+    ) -> Result<(), Failure> {
+        let frame = self.graph.nodes[n as usize].frame;
+        for (i, (o, part)) in args.into_iter().zip(pulled).enumerate() {
+            let Some(source) = o.and_then(|o| self.source(frame, o)) else { continue };
+            if !self.is_active(source) {
+                continue;
+            }
+            if part.is_unknown() {
+                let name = builtin.args.get(i).or(builtin.args.last()).map_or("", |a| a.name);
+                return Err(self.no_derivative(n, &format!("`{}` by its argument `{name}`", builtin.full_name())));
+            }
+            self.give_node(source, part);
+        }
+        Ok(())
+    }
+}
