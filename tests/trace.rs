@@ -325,3 +325,26 @@ fn restored_states_are_the_saved_ones() {
         }
     }
 }
+
+/// Two branches draw at one address: whichever is there is found by it, after moves that were kept and moves that were not.
+#[test]
+fn choices_are_found_by_their_addresses_as_branches_change() {
+    use pcadlang::infer::{At, Kernel, Mh, Pick, Scope};
+    let model = Model::from_text(
+        "assume c ~ flip(0.4);
+         assume x = if c { z[0] ~ normal(1, 1); z[0] } else { z[0] ~ normal(-1, 1); z[1] ~ normal(0, 1); z[0] + z[1] };
+         observe normal(x, 1) = 0.5;",
+    )
+    .unwrap_or_else(|e| panic!("{e}"));
+    let mut trace = model.simulate(1, 0).unwrap_or_else(|e| panic!("{e}"));
+    let mut kernel = Mh::new(Scope { selector: Selector::All, pick: Pick::One });
+    for step in 0..200 {
+        let accepted = kernel.step(&mut trace, &At::new(1, 0, step)).unwrap_or_else(|e| panic!("{e}")).accepted;
+        let draws = Streams { key: StreamKey::new(1, 0, Purpose::PREDICT), step, lane: 0 };
+        assert!(trace.global("x", draws).is_some_and(|x| x.is_ok()));
+        for t in trace.all_targets().to_vec() {
+            let address = trace.address(t);
+            assert_eq!(trace.find(&address), Some(t), "step {step} (accepted {accepted}): {address}");
+        }
+    }
+}

@@ -2,7 +2,7 @@
 
 use super::expr::{Scope, evaluate};
 use super::kernel::Kernel;
-use super::kernels::{Block, Drift, Elliptical, Gibbs, Hmc, Knn, Mh, Nuts, Optimize, Own, Slice, Temper};
+use super::kernels::{Abc, Block, Drift, Elliptical, Gibbs, Hmc, Knn, Mh, Nuts, Optimize, Own, Slice, Smc, Temper};
 use super::plan::banks::neighbours;
 use super::plan::{RunOptions, argument, call};
 use super::selection::{fail, scope};
@@ -44,6 +44,11 @@ pub(super) fn build(
         let signature = format!("{name}{arguments:?}");
         return Ok(Built { kernel: Box::new(Own::new(code, k.clone(), arguments)), signature });
     }
+    if env.code.builtins.find("", name).is_some_and(|i| env.code.builtins.get(i).is_planned()) {
+        let mut e = fail(e.span, format!("the kernel `{name}` is not available yet in this version"));
+        e.hint = Some(format!("those that are: {AVAILABLE}"));
+        return Err(e);
+    }
     let Some(first) = args.first() else {
         return Err(fail(e.span, format!("`{name}` needs a selection of choices, e.g. @**")));
     };
@@ -57,6 +62,20 @@ pub(super) fn build(
         let signature = format!("temper({}, {levels}, {hottest})", inner[0].signature);
         let kernel = Temper::new(inner.into_iter().map(|b| b.kernel).collect(), hottest.min(1.0));
         return Ok(Built { kernel: Box::new(kernel), signature });
+    }
+    if name == "smc" {
+        let inner = build(&first.value, frozen, options, env)?;
+        let particles = whole(argument(args, 1, "particles"), "particles", 100, 2, 1_000_000, env)?;
+        let signature = format!("smc({}, {particles})", inner.signature);
+        let kernel = Smc::new(inner.kernel, particles as usize, frozen.clone(), e.span);
+        return Ok(Built { kernel: Box::new(kernel), signature });
+    }
+    if name == "abc" {
+        let inner = build(&first.value, frozen, options, env)?;
+        let eps = positive(argument(args, 1, "eps"), name, "eps", env)?;
+        let eps = eps.ok_or_else(|| fail(e.span, "abc needs the largest distance that is accepted, `eps`".into()))?;
+        let signature = format!("abc({}, {eps})", inner.signature);
+        return Ok(Built { kernel: Box::new(Abc::new(inner.kernel, eps, e.span)), signature });
     }
     let mut scope = scope(&first.value, env)?;
     if *frozen != Selector::Nothing {
@@ -77,16 +96,12 @@ pub(super) fn build(
         "optimize" => {
             Box::new(Optimize::new(scope, whole(argument(args, 1, "steps"), "steps", 100, 1, 1_000_000, env)?))
         }
-        _ => {
-            let mut e = fail(e.span, format!("the kernel `{name}` is not available yet in this version"));
-            e.hint = Some(format!("those that are: {AVAILABLE}"));
-            return Err(e);
-        }
+        _ => return Err(fail(e.span, format!("`{name}` is no kernel"))),
     };
     Ok(Built { kernel, signature })
 }
 
-const AVAILABLE: &str = "mh, block, drift, gibbs, elliptical, hmc, mala, nuts, slice, knn, temper, optimize";
+const AVAILABLE: &str = "mh, block, drift, gibbs, elliptical, hmc, mala, nuts, slice, knn, temper, smc, abc, optimize";
 
 /// A positive number that a kernel takes besides its selection, if it is given.
 fn positive(e: Option<&Expr>, kernel: &str, name: &str, env: &mut Scope) -> Result<Option<f64>, Box<RunError>> {

@@ -130,6 +130,9 @@ pub struct KernelStats {
     /// Trajectories on which the energy was not kept (Hamiltonian kernels).
     #[serde(default)]
     pub divergent: u64,
+    /// The log of the evidence, from kernels that estimate it: of several chains that of the mean estimate.
+    #[serde(default, skip_serializing_if = "Option::is_none")]
+    pub log_evidence: Option<f64>,
 }
 
 /// What single-site kernels did to one choice in a chain, or in all of them.
@@ -180,13 +183,20 @@ impl KernelStats {
     /// The kernels of several chains, added up by name, in order of first appearance.
     pub fn total<'a>(stats: impl IntoIterator<Item = &'a KernelStats>) -> Vec<KernelStats> {
         let mut sum: indexmap::IndexMap<&str, KernelStats> = indexmap::IndexMap::new();
-        for s in stats {
+        let all: Vec<&KernelStats> = stats.into_iter().collect();
+        for s in &all {
             let t = sum.entry(&s.name).or_insert_with(|| KernelStats { name: s.name.clone(), ..Default::default() });
             t.proposals += s.proposals;
             t.accepted += s.accepted;
             t.seconds += s.seconds;
             t.failed += s.failed;
             t.divergent += s.divergent;
+        }
+        for t in sum.values_mut() {
+            let same = all.iter().filter(|s| s.name == t.name);
+            let estimates: Vec<f64> = same.filter_map(|s| s.log_evidence).collect();
+            let mean = || crate::num::log_sum_exp(&estimates) - libm::log(estimates.len() as f64);
+            t.log_evidence = (!estimates.is_empty()).then(mean);
         }
         sum.into_values().collect()
     }
@@ -204,7 +214,7 @@ mod tests {
             accepted,
             seconds: 0.5,
             failed: 1,
-            divergent: 0,
+            ..Default::default()
         };
         let total = KernelStats::total(&[k("mh", 4, 1), k("drift", 2, 2), k("mh", 6, 4)]);
         assert_eq!(total.iter().map(|t| &*t.name).collect::<Vec<_>>(), ["mh", "drift"]);

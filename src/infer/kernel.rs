@@ -107,6 +107,11 @@ pub trait Kernel: Send {
         None
     }
 
+    /// The log of the evidence (the marginal likelihood), for kernels that estimate it.
+    fn log_evidence(&self) -> Option<f64> {
+        None
+    }
+
     /// Moves the trace by one step.
     ///
     /// # Errors

@@ -5,6 +5,8 @@
 //! loop passes) are blocks of their own. The trace instantiates a block as a frame of nodes, one node a slot, and
 //! evaluates a slot when something asks for it.
 
+pub use super::slots::{SlotFacts, Spread};
+
 use super::builtins::Table;
 use super::key::Key;
 use super::value::Value;
@@ -120,34 +122,6 @@ pub struct Block {
     pub result: Option<Operand>,
     /// The slots that run whether or not anything asks for them: observations, factors, and what contains them.
     pub effects: Vec<Slot>,
-}
-
-/// What updates need to know of a slot.
-#[derive(Clone, Debug, Default)]
-pub struct SlotFacts {
-    /// The slot.
-    pub slot: Slot,
-    /// Whether it runs although nothing asks for it.
-    pub is_effect: bool,
-    /// Whether it is a random choice.
-    pub is_draw: bool,
-    /// Whether it is the result of its block.
-    pub is_result: bool,
-    /// The slots it reads whenever it is evaluated: how many levels out, and which; `None` where that depends on the state.
-    pub reads: Option<Box<[(u16, Slot)]>>,
-    /// The slots of the same block that have it as an operand.
-    pub users: Box<[Slot]>,
-    /// For a choice that only computations of its own block depend on: how its change spreads.
-    pub spread: Option<Spread>,
-}
-
-/// The part of a choice's scaffold that lies in its own block, where that is the same in every state.
-#[derive(Clone, Debug)]
-pub struct Spread {
-    /// What depends on the choice, each after what it reads, up to and including observations and other choices.
-    pub slots: Box<[Slot]>,
-    /// Whether none of them reads anything of another block.
-    pub is_closed: bool,
 }
 
 /// A place in the text that adds to addresses.
@@ -443,22 +417,6 @@ impl Op {
     }
 }
 
-impl Op {
-    /// Where its operands are, if those it always reads are all it holds.
-    fn reads(&self) -> Option<Box<[(u16, Slot)]>> {
-        if matches!(self, Op::Param { .. } | Op::Call { .. } | Op::Select { .. } | Op::Fold { .. } | Op::Gather) {
-            return None;
-        }
-        let mut reads = Vec::new();
-        self.operands(|o| match o {
-            Operand::Const(_) => {}
-            Operand::Local(slot) => reads.push((0, slot)),
-            Operand::Outer { up, slot } => reads.push((up, slot)),
-        });
-        Some(reads.into())
-    }
-}
-
 impl Block {
     /// An empty block.
     pub fn new(kind: BlockKind, parent: Option<BlockId>) -> Self {
@@ -505,88 +463,6 @@ impl Code {
         Operand::Const(self.consts.len() as u32 - 1)
     }
 
-    /// Fills in what follows from the operations: in-block users and effects.
-    pub fn finish(&mut self) {
-        super::flatten::flatten(self);
-        let effects = self.find_effects();
-        for (block, is_effect) in self.blocks.iter_mut().zip(effects) {
-            block.effects = (0..block.ops.len() as Slot).filter(|s| is_effect[*s as usize]).collect();
-            block.first = self.ops.len() as u32;
-            let mut users = vec![Vec::new(); block.ops.len()];
-            for (slot, op) in block.ops.iter().enumerate() {
-                let mut uses = |o| {
-                    if let Operand::Local(s) = o
-                        && users[s as usize].last() != Some(&(slot as Slot))
-                    {
-                        users[s as usize].push(slot as Slot);
-                    }
-                };
-                op.operands(&mut uses);
-                if let Op::Select { then, otherwise, .. } = op {
-                    uses(*then);
-                    uses(*otherwise);
-                }
-                if matches!(op, Op::Gather) {
-                    users[slot - 1].push(slot as Slot);
-                }
-            }
-            for (slot, (op, users)) in block.ops.drain(..).zip(users).enumerate() {
-                self.slots.push(SlotFacts {
-                    slot: slot as Slot,
-                    is_effect: is_effect[slot],
-                    is_draw: matches!(op, Op::Draw { .. }),
-                    is_result: block.result == Some(Operand::Local(slot as Slot)),
-                    reads: op.reads(),
-                    users: users.into(),
-                    spread: None,
-                });
-                self.ops.push(op);
-            }
-            let slots = &self.slots[block.first as usize..];
-            let spreads: Vec<_> = (0..slots.len())
-                .filter(|s| slots[*s].is_draw)
-                .map(|s| (s, super::spread::spread(&self.ops[block.first as usize..], slots, s as Slot)))
-                .collect();
-            for (slot, spread) in spreads {
-                self.slots[block.first as usize + slot].spread = spread;
-            }
-        }
-    }
-
-    /// Marks the slots that observe, or hold or call a block that does. Calls of function values count if any function
-    /// that is used as a value observes.
-    fn find_effects(&self) -> Vec<Vec<bool>> {
-        let n = self.blocks.len();
-        let mut observes = vec![false; n];
-        let mut escaped_observes = false;
-        loop {
-            let mut changed = false;
-            for b in 0..n {
-                let has = self.blocks[b].ops.iter().any(|op| op_observes(op, &observes, escaped_observes));
-                if has && !observes[b] {
-                    observes[b] = true;
-                    changed = true;
-                }
-            }
-            let escaped = self.blocks.iter().flat_map(|b| &b.ops).any(|op| match op {
-                Op::Closure(block) => observes[*block as usize],
-                _ => false,
-            }) || self.consts.iter().any(|c| match c {
-                Value::Closure(c) => observes[c.block as usize],
-                _ => false,
-            });
-            if escaped && !escaped_observes {
-                escaped_observes = true;
-                changed = true;
-            }
-            if !changed {
-                break;
-            }
-        }
-        let of = |b: &Block| b.ops.iter().map(|op| op_observes(op, &observes, escaped_observes)).collect();
-        self.blocks.iter().map(of).collect()
-    }
-
     /// The value of a constant.
     pub fn const_value(&self, i: u32) -> &Value {
         &self.consts[i as usize]
@@ -598,16 +474,5 @@ impl Code {
             Operand::Const(i) => Key::from_value(self.const_value(i)),
             _ => None,
         }
-    }
-}
-
-fn op_observes(op: &Op, observes: &[bool], escaped: bool) -> bool {
-    match op {
-        Op::Observe { .. } | Op::Factor { .. } => true,
-        Op::If { then, otherwise, .. } => observes[*then as usize] || observes[*otherwise as usize],
-        Op::For { body, .. } => observes[*body as usize],
-        Op::Call { callee: Callee::Static(b), .. } => observes[*b as usize],
-        Op::Call { callee: Callee::Value(_), .. } | Op::Map { .. } | Op::Fold { .. } => escaped,
-        _ => false,
     }
 }

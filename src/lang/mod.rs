@@ -12,5 +12,6 @@ pub mod index;
 pub mod key;
 pub mod load;
 pub mod lower;
+mod slots;
 mod spread;
 pub mod value;

@@ -93,7 +93,13 @@ pub fn kernels(kernels: &[KernelStats]) -> String {
         };
         rows.push(vec![k.name.clone(), k.proposals.to_string(), rate, k.failed.to_string(), super::seconds(k.seconds)]);
     }
-    aligned(&narrowed(rows))
+    let mut text = aligned(&narrowed(rows));
+    for k in kernels {
+        if let Some(log) = k.log_evidence {
+            text += &format!("log evidence by {}: {log:.3}\n", k.name);
+        }
+    }
+    text
 }
 
 /// Names (the first column) are cut in their middle until the lines fit, for their ends tell them apart.
@@ -121,7 +127,7 @@ mod tests {
     use super::*;
 
     fn kernel(name: &str, proposals: u64, accepted: u64) -> KernelStats {
-        KernelStats { name: name.into(), proposals, accepted, seconds: 0.5, failed: 1, divergent: 0 }
+        KernelStats { name: name.into(), proposals, accepted, seconds: 0.5, failed: 1, ..Default::default() }
     }
 
     #[test]

@@ -91,7 +91,7 @@ mod tests {
     }
 
     fn kernel(proposals: u64, accepted: u64, failed: u64) -> KernelStats {
-        KernelStats { name: "mh(@x)".into(), proposals, accepted, seconds: 0.1, failed, divergent: 0 }
+        KernelStats { name: "mh(@x)".into(), proposals, accepted, seconds: 0.1, failed, ..Default::default() }
     }
 
     #[test]

@@ -16,6 +16,7 @@ mod observed;
 mod path;
 mod peek;
 mod propose;
+mod query;
 mod save;
 mod select;
 mod spread;
@@ -398,76 +399,6 @@ impl Trace {
         self.all_targets().len()
     }
 
-    /// The values of expressions of the top level; what they need and no observation asks for is drawn from its prior
-    /// given the rest, and forgotten again.
-    ///
-    /// # Errors
-    /// What goes wrong while they are evaluated.
-    pub fn query(&mut self, operands: &[Operand], draws: Draws) -> TraceResult<Vec<Value>> {
-        self.asked(operands, draws, |_, values| Ok(values))
-    }
-
-    /// As [`Trace::query`], and shows the trace with the choices that were drawn for it, before they are forgotten.
-    ///
-    /// # Errors
-    /// As [`Trace::query`].
-    pub fn imagine<T>(
-        &mut self,
-        operands: &[Operand],
-        draws: Draws,
-        look: impl FnOnce(&Trace, Vec<Value>) -> T,
-    ) -> TraceResult<T> {
-        self.asked(operands, draws, |trace, values| {
-            trace.graph.settle_choices(&trace.code)?;
-            Ok(look(trace, values))
-        })
-    }
-
-    /// Evaluates expressions, uses them, and forgets them.
-    fn asked<T>(
-        &mut self,
-        operands: &[Operand],
-        draws: Draws,
-        used: impl FnOnce(&mut Trace, Vec<Value>) -> TraceResult<T>,
-    ) -> TraceResult<T> {
-        self.rollback();
-        let before = self.graph.begin();
-        self.graph.draws = draws;
-        self.graph.before = Some(before.clone());
-        let result = self.graph.query(&self.code, operands);
-        self.graph.before = None;
-        let result = result.and_then(|values| used(self, values));
-        self.graph.rollback(&self.code, before);
-        result
-    }
-
-    /// The value of a top-level name.
-    ///
-    /// # Errors
-    /// As [`Trace::query`]; `None` if there is no such name.
-    pub fn global(&mut self, name: &str, draws: Draws) -> Option<TraceResult<Value>> {
-        let operand = *self.code.globals.get(name)?;
-        Some(self.query(&[operand], draws).map(|mut v| v.swap_remove(0)))
-    }
-
-    /// The log density of the coarse surrogate of an observation (`with coarse = …`), by the address it has. It is never
-    /// part of the joint.
-    ///
-    /// # Errors
-    /// What goes wrong while it is evaluated; `None` if there is no such observation or it has no surrogate.
-    pub fn surrogate(&mut self, address: &Address, draws: Draws) -> TraceResult<Option<f64>> {
-        let Some((n, _)) = self.scored().into_iter().find(|(n, _)| self.graph.address(&self.code, *n) == *address)
-        else {
-            return Ok(None);
-        };
-        self.rollback();
-        let before = self.graph.begin();
-        self.graph.draws = draws;
-        let result = self.graph.surrogate_score(&self.code, n);
-        self.graph.rollback(&self.code, before);
-        result
-    }
-
     /// Named points of the scene as the observations put them (see [`crate::lang::value::Likelihood::located`]).
     pub fn located(&self) -> Vec<Located> {
         self.likelihoods().flat_map(|(l, observed)| l.located(observed)).collect()
@@ -556,12 +487,29 @@ impl Trace {
     /// # Errors
     /// What the program does wrong.
     pub fn rerun(&self) -> TraceResult<Trace> {
-        let saved = self.constraints();
-        let code = match Arc::ptr_eq(&self.graph.observed, &self.code.observed) {
+        Trace::generate(self.present_code(), self.constraints(), Draws::default(), self.graph.limits).map(|(t, _)| t)
+    }
+
+    /// Another execution of the same program under the same observations, with the values of some choices given.
+    ///
+    /// # Errors
+    /// What the program does wrong.
+    pub(crate) fn another(
+        &self,
+        constraints: impl IntoIterator<Item = (u64, Constraint)>,
+        draws: Draws,
+    ) -> TraceResult<Trace> {
+        let mut trace = Trace::generate(self.present_code(), constraints, draws, self.graph.limits)?.0;
+        trace.graph.incremental = self.graph.incremental;
+        Ok(trace)
+    }
+
+    /// The program, with the values that are observed now.
+    fn present_code(&self) -> Arc<Code> {
+        match Arc::ptr_eq(&self.graph.observed, &self.code.observed) {
             true => Arc::clone(&self.code),
             false => Arc::new(self.code.with_observed(Arc::clone(&self.graph.observed))),
-        };
-        Trace::generate(code, saved, Draws::default(), self.graph.limits).map(|(t, _)| t)
+        }
     }
 
     /// The choices as constraints for [`Trace::generate`].

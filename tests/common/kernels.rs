@@ -22,9 +22,13 @@ pub mod exact {
         "slice(@x)",
         "slice(@x, width = 0.3)",
         "temper(drift(@x), levels = 3)",
+        "smc(drift(@x, scale = 1), particles = 8)",
         "mix { 0.3 => mh(@x); 0.3 => drift(@x); 0.4 => elliptical(@x); }",
     ];
     pub const BETA_BINOMIAL: &[&str] = &["mh(@p)", "drift(@p)"];
+    /// Evidence and structure with particles; likelihood-free.
+    pub const SIMULATED: &[&str] =
+        &["smc(drift(@x, scale = 1), particles = 40)", "smc(mh(one(@**)), particles = 20)", "abc(mh(@p), eps = 0.5)"];
     pub const DEPENDENT_SUPPORT: &[&str] = &["mh(one(@**))", "block(@**)", "drift(@**)", "drift(one(@**))"];
     pub const RECURSION: &[&str] = &[
         "mh(one(@**))",
@@ -49,7 +53,7 @@ pub mod exact {
         "gibbs(one($discrete)); mh(one($continuous)); mh(one($discrete));",
     ];
     pub const ALL: &[&[&str]] =
-        &[CONJUGATE, BETA_BINOMIAL, DEPENDENT_SUPPORT, RECURSION, BRANCHES, HIDDEN_MARKOV, OPEN_UNIVERSE];
+        &[CONJUGATE, BETA_BINOMIAL, SIMULATED, DEPENDENT_SUPPORT, RECURSION, BRANCHES, HIDDEN_MARKOV, OPEN_UNIVERSE];
 }
 
 /// Reversible, with the right marginal (`tests/balance.rs`).
@@ -171,6 +175,7 @@ pub const CALIBRATED: &[&str] = &[
     "mh(@c); nuts($continuous, max_depth = 5);",
     "temper(mh(one(@**)), levels = 3);",
     "gibbs(each($finite)); drift(each($continuous));",
+    "smc(mh(one(@**)), particles = 4);",
 ];
 
 /// Chains that are the same bit for bit with and without incremental updates, on any number of threads (`tests/trace.rs`).

@@ -1,5 +1,6 @@
 //! The kernels, one file each.
 
+mod abc;
 mod block;
 mod drift;
 mod elliptical;
@@ -10,8 +11,10 @@ mod mh;
 pub(crate) mod own;
 mod shape;
 mod slice;
+mod smc;
 mod temper;
 
+pub use abc::Abc;
 pub use block::Block;
 pub use drift::Drift;
 pub use elliptical::Elliptical;
@@ -21,4 +24,5 @@ pub use knn::Knn;
 pub use mh::Mh;
 pub(crate) use own::Own;
 pub use slice::Slice;
+pub use smc::Smc;
 pub use temper::Temper;

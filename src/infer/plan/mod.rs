@@ -140,6 +140,12 @@ struct Instance {
     stats: KernelStats,
 }
 
+impl Instance {
+    fn into_stats(self) -> KernelStats {
+        KernelStats { log_evidence: self.kernel.log_evidence(), ..self.stats }
+    }
+}
+
 pub(crate) struct Runner<'a> {
     code: &'a Arc<Code>,
     options: &'a RunOptions,
@@ -224,7 +230,7 @@ pub(crate) fn run_chain(
         steps,
         warmup,
         draws: runner.draws,
-        kernels: runner.instances.into_iter().map(|i| i.stats).collect(),
+        kernels: runner.instances.into_iter().map(Instance::into_stats).collect(),
         sites: runner.sites.into_stats(),
         seconds,
     })

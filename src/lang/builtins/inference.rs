@@ -10,7 +10,7 @@ const CHOICES: &str = "Selections and starts";
 const MONITORS: &str = "Monitors and reports";
 
 /// What this version checks and documents but cannot run.
-pub(super) const PLANNED: &[&str] = &["delayed", "smc", "abc", "marginal", "acceptance", "rhat", "ess", "snapshot"];
+pub(super) const PLANNED: &[&str] = &["delayed", "marginal", "acceptance", "rhat", "ess", "snapshot"];
 
 const fn name(
     name: &'static str,
@@ -134,14 +134,16 @@ pub(super) const TABLE: &[Builtin] = &[
         KERNELS,
         &[INNER, opt("particles", Type::Int, "100", "The number of particles.")],
         Type::Kernel,
-        "Annealed sequential Monte Carlo with rejuvenation by the kernel inside; estimates the evidence.",
+        "Whole states by annealed sequential Monte Carlo, moved by the kernel inside, accepted by their estimates of the evidence \
+         (particle independent Metropolis-Hastings, Andrieu et al. 2010). No other kernel may move the state in between.",
     ),
     name(
         "abc",
         KERNELS,
         &[INNER, arg("eps", Type::Num, "The largest distance that is accepted.")],
         Type::Kernel,
-        "Likelihood-free acceptance by a distance.",
+        "Likelihood-free: the kernel inside proposes from the prior, and what it proposes stays if data drawn from it are near those \
+         observed, in root mean square (Marjoram et al. 2003).",
     ),
     name(
         "optimize",

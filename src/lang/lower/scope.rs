@@ -102,6 +102,8 @@ impl Lowerer<'_> {
     pub fn reach(o: Operand, up: u16) -> Operand {
         match o {
             Operand::Local(slot) if up > 0 => Operand::Outer { up, slot },
+            // Another name for something further out still.
+            Operand::Outer { up: further, slot } => Operand::Outer { up: further + up, slot },
             o => o,
         }
     }

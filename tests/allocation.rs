@@ -1,0 +1,91 @@
+//! A transition of fixed structure allocates nothing once the trace has warmed up.
+//!
+//! Counting allocations takes an allocator, whose trait is unsafe; it only counts and passes on to the system's.
+
+use pcadlang::Model;
+use pcadlang::infer::{At, Gibbs, Kernel, Mh, Pick, Scope};
+use pcadlang::trace::{Selector, Trace};
+use std::alloc::{GlobalAlloc, Layout, System};
+use std::cell::Cell;
+
+thread_local! {
+    static COUNT: Cell<u64> = const { Cell::new(0) };
+}
+
+struct Counting;
+
+// SAFETY: every call goes to the system's allocator as it came.
+unsafe impl GlobalAlloc for Counting {
+    unsafe fn alloc(&self, layout: Layout) -> *mut u8 {
+        let _ = COUNT.try_with(|c| c.set(c.get() + 1));
+        // SAFETY: as above.
+        unsafe { System.alloc(layout) }
+    }
+
+    unsafe fn dealloc(&self, p: *mut u8, layout: Layout) {
+        // SAFETY: as above.
+        unsafe { System.dealloc(p, layout) }
+    }
+
+    unsafe fn realloc(&self, p: *mut u8, layout: Layout, size: usize) -> *mut u8 {
+        let _ = COUNT.try_with(|c| c.set(c.get() + 1));
+        // SAFETY: as above.
+        unsafe { System.realloc(p, layout, size) }
+    }
+}
+
+#[global_allocator]
+static ALLOCATOR: Counting = Counting;
+
+/// Allocations in so many steps, after as many to warm up.
+fn allocations(kernel: &mut dyn Kernel, trace: &mut Trace, steps: u64) -> u64 {
+    let mut run = |first: u64| {
+        for step in first..first + steps {
+            kernel.step(trace, &At::new(1, 0, step)).unwrap_or_else(|e| panic!("{e}"));
+        }
+    };
+    run(0);
+    let before = COUNT.with(Cell::get);
+    run(steps);
+    COUNT.with(Cell::get) - before
+}
+
+fn scope(tag: &str) -> Scope {
+    Scope { selector: Selector::Tag { name: tag.into(), value: None }, pick: Pick::One }
+}
+
+const REGRESSION: &str = "let n = 50;
+    assume slope ~ normal(0, 2) #coef; assume intercept ~ normal(0, 2) #coef; assume log_noise ~ normal(0, 1) #coef;
+    let noise = exp(log_noise);
+    for i in 0 .. n {
+      outlier[i] ~ flip(0.1) #flag;
+      observe normal(if outlier[i] { 0 } else { slope * i / n + intercept }, if outlier[i] { 10 } else { noise }) = i % 7;
+    }";
+
+const CHAIN: &str = "let move = [[0.8, 0.1, 0.1], [0.1, 0.8, 0.1], [0.1, 0.1, 0.8]];
+    for t in 0 .. 50 {
+      z[t] ~ categorical(if t == 0 { [1, 1, 1] } else { move[z[t - 1]] }) #state;
+      observe normal(2 * z[t], 1) = t % 5;
+    }";
+
+#[test]
+fn transitions_of_fixed_structure_allocate_nothing() {
+    let kernels: [fn(Scope) -> Box<dyn Kernel>; 2] = [|s| Box::new(Gibbs::new(s)), |s| Box::new(Mh::new(s))];
+    for make in kernels {
+        for (text, tag) in [(REGRESSION, "flag"), (CHAIN, "state")] {
+            let model = Model::from_text(text).unwrap_or_else(|e| panic!("{e}"));
+            let mut trace = model.simulate(1, 0).unwrap_or_else(|e| panic!("{e}"));
+            let mut kernel = make(scope(tag));
+            let count = allocations(&mut *kernel, &mut trace, 20_000);
+            assert_eq!(count, 0, "{} of ${tag}: {count} allocations in 20,000 steps", kernel.name());
+        }
+    }
+}
+
+#[test]
+fn redrawing_a_coefficient_that_all_points_read_allocates_nothing() {
+    let model = Model::from_text(REGRESSION).unwrap_or_else(|e| panic!("{e}"));
+    let mut trace = model.simulate(1, 0).unwrap_or_else(|e| panic!("{e}"));
+    let count = allocations(&mut Mh::new(scope("coef")), &mut trace, 2000);
+    assert_eq!(count, 0, "{count} allocations in 2,000 steps");
+}

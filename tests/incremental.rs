@@ -1,0 +1,92 @@
+//! The same chain, bit for bit, by increments and by running everything again: every shipped program, and random ones.
+
+use pcadlang::Program;
+use pcadlang::infer::RunOptions;
+use proptest::prelude::*;
+
+fn chains(program: impl Fn() -> Program, incremental: bool, steps: u64, warmup: u64) -> Vec<(String, Vec<u64>)> {
+    let model = program().compile().unwrap_or_else(|e| panic!("{e}"));
+    let options =
+        RunOptions { seed: 5, steps: Some(steps), warmup: Some(warmup), incremental, ..RunOptions::default() };
+    let posterior = model.run(&options, 2, 2).unwrap_or_else(|e| panic!("{e}"));
+    posterior.scalars().into_iter().map(|(n, xs)| (n, xs.into_iter().map(f64::to_bits).collect())).collect()
+}
+
+fn same(what: &str, program: impl Fn() -> Program, steps: u64, warmup: u64) {
+    let (some, all) = (chains(&program, true, steps, warmup), chains(&program, false, steps, warmup));
+    assert!(!some.is_empty(), "{what}: nothing is recorded");
+    assert!(some == all, "{what}: increments and full re-execution give different chains");
+}
+
+#[test]
+fn shipped_programs() {
+    let root = env!("CARGO_MANIFEST_DIR");
+    let photo = format!("{root}/examples/images/coffee_cup.png");
+    for (name, observed, steps, warmup) in [
+        ("coin.pcad", false, 500, 200),
+        ("linreg.pcad", false, 300, 200),
+        ("mixture.pcad", false, 600, 300),
+        ("crp.pcad", false, 400, 200),
+        ("geometric.pcad", false, 500, 200),
+        ("lathe.pcad", true, 12, 12),
+        ("lathe_paper.pcad", true, 12, 12),
+    ] {
+        let open = || {
+            let program = Program::open(name).unwrap_or_else(|e| panic!("{e}"));
+            let first = program.interface().data.iter().find(|d| !d.has_default).map(|d| d.name.to_string());
+            match first.filter(|_| observed) {
+                Some(data) => program.observe_file(&data, &photo).unwrap_or_else(|e| panic!("{e}")),
+                None => program,
+            }
+        };
+        same(name, open, steps, warmup);
+    }
+}
+
+/// A program of a few choices that read each other through arithmetic, branches, loops and arrays.
+fn program() -> impl Strategy<Value = String> {
+    let number = |n: usize| {
+        prop_oneof![
+            (0..n.max(1)).prop_map(move |i| if n == 0 { "1".to_owned() } else { format!("x{i}") }),
+            (-20..20i32).prop_map(|k| format!("({}.0 / 10)", k)),
+        ]
+    };
+    let expression = move |n: usize| {
+        (number(n), number(n), number(n), 0..6usize).prop_map(|(a, b, c, kind)| match kind {
+            0 => format!("{a} + 0.5 * {b}"),
+            1 => format!("sin({a}) * {b}"),
+            2 => format!("if {a} > {b} {{ {c} }} else {{ {a} - 1 }}"),
+            3 => format!("[{a}, {b}, {c}][1]"),
+            4 => format!("max({a}, {b})"),
+            _ => a,
+        })
+    };
+    let choice = move |i: usize| {
+        (expression(i), 0..5usize).prop_map(move |(e, kind)| match kind {
+            0 | 1 => format!("assume x{i} ~ normal({e}, 1);"),
+            2 => format!("assume f{i} ~ flip(0.4); assume x{i} = if f{i} {{ a ~ normal({e}, 1); a }} else {{ {e} }};"),
+            3 => format!("assume x{i} ~ categorical([1, 2, 1 + abs({e})]);"),
+            _ => format!("assume f{i} ~ flip(0.3); let x{i} = if f{i} {{ {e} }} else {{ 0.5 }};"),
+        })
+    };
+    let choices: Vec<_> = (0..5).map(choice).collect();
+    (choices, expression(5), expression(5)).prop_map(|(choices, a, b)| {
+        format!(
+            "{}\nfor i in 0 .. 4 {{ g[i] ~ flip(0.2); let u = {b}; observe normal(if g[i] {{ {a} }} else {{ u + i }}, 1) = 0.3 * i; }}
+             observe normal({a}, 2) = 1;
+             infer {{ warmup 20 {{ drift(@**); }}
+               repeat 60 {{ mix {{ 0.3 => mh(one(@**)); 0.2 => gibbs(one($finite)); 0.2 => gibbs(each($finite));
+                                   0.2 => drift(one($continuous)); 0.1 => block(@**); }} }} }}",
+            choices.join("\n")
+        )
+    })
+}
+
+proptest! {
+    #![proptest_config(ProptestConfig { cases: 60, failure_persistence: None, ..ProptestConfig::default() })]
+    #[test]
+    fn random_programs(text in program()) {
+        let parse = || Program::parse(&text).unwrap_or_else(|e| panic!("{e}\n{text}"));
+        same(&text, parse, 60, 20);
+    }
+}
