@@ -175,7 +175,6 @@ pub const CALIBRATED: &[&str] = &[
     "mh(@c); nuts($continuous, max_depth = 5);",
     "temper(mh(one(@**)), levels = 3);",
     "gibbs(each($finite)); drift(each($continuous));",
-    "smc(mh(one(@**)), particles = 4);",
 ];
 
 /// Chains that are the same bit for bit with and without incremental updates, on any number of threads (`tests/trace.rs`).
