@@ -79,9 +79,13 @@ fn small_shipped_programs() {
     }
 }
 
+/// Many minutes a program: `LONG=1 cargo test --release --test calibration -- --ignored`.
 #[test]
-#[ignore = "minutes"]
+#[ignore = "many minutes, and only with LONG=1"]
 fn every_shipped_program_that_can_be_simulated() {
+    if std::env::var_os("LONG").is_none() {
+        return;
+    }
     for name in ["coin.pcad", "geometric.pcad", "linreg.pcad", "mixture.pcad", "crp.pcad"] {
         passes(name, &shipped(name), Check::Ranks(200, None));
         passes(name, &shipped(name), Check::Turns(100, None));

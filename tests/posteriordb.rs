@@ -1,5 +1,5 @@
 //! Six posteriors of posteriordb with the default plan: means and mean squares against the reference, |z| < 4 at more than 400
-//! effective draws of each parameter.
+//! effective draws of each parameter. `cargo test --release --test posteriordb -- --include-ignored --nocapture` prints times.
 
 use pcadlang::infer::RunOptions;
 use pcadlang::infer::diagnostics::{ess_bulk, ess_mean, mcse_mean, r_hat};
@@ -75,6 +75,7 @@ fn eight_schools() {
 }
 
 #[test]
+#[ignore = "a minute"]
 fn regression_with_flat_priors() {
     passes("kidscore_momiq");
 }
@@ -85,11 +86,13 @@ fn gaussian_process() {
 }
 
 #[test]
+#[ignore = "a minute"]
 fn mixture() {
     passes("gauss_mix");
 }
 
 #[test]
+#[ignore = "a minute"]
 fn autoregression() {
     passes("arK");
 }

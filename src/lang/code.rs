@@ -288,7 +288,7 @@ pub enum Op {
         /// When false.
         otherwise: BlockId,
     },
-    /// A branch whose alternatives are slots of this block (see [`super::flatten`]): only the one taken is asked for.
+    /// A branch whose alternatives are slots of this block (made by `flatten`): only the one taken is asked for.
     Select {
         /// The condition.
         cond: Operand,

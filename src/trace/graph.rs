@@ -311,11 +311,7 @@ impl Graph {
                 operand(if self.nodes[n as usize].flags & OTHERWISE == 0 { *then } else { *otherwise });
             }
             // Arguments are held by the parameters that read them.
-            Op::Call { callee, .. } => {
-                if let Callee::Value(v) = callee {
-                    operand(*v);
-                }
-            }
+            Op::Call { callee: Callee::Value(v), .. } => operand(*v),
             // The first running value is held by the accumulator of the first pass, if there is one.
             Op::Fold { f: g, over, .. } => {
                 operand(*g);

@@ -92,14 +92,6 @@ impl<'a> Args<'a> {
         })
     }
 
-    /// An array of numbers, shared with the value where that is one.
-    pub fn shared_array(&self, i: usize) -> Result<Arc<[f64]>, Fault> {
-        match self.get(i) {
-            Value::Array(xs) => Ok(Arc::clone(xs)),
-            _ => Ok(self.array(i)?.into()),
-        }
-    }
-
     /// A truth value, or a default.
     pub fn bool_or(&self, i: usize, default: bool) -> Result<bool, Fault> {
         match self.get(i) {

@@ -76,7 +76,7 @@ pub(super) const TABLE: &[Builtin] = &[
     other(
         "categorical",
         &[arg("weights", Type::Array, "One weight for each of 0, 1, …; they need not sum to 1.")],
-        |a| dist::Categorical::new(a.shared_array(0)?).map(Dist::Categorical).map_err(fault),
+        |a| dist::Categorical::new(a.array(0)?).map(Dist::Categorical).map_err(fault),
     ),
     other("dirichlet", &[arg("alpha", Type::Array, "One positive concentration for each share.")], |a| {
         dist::Dirichlet::new(&a.array(0)?).map(|d| Dist::Dirichlet(Arc::new(d))).map_err(fault)

@@ -87,7 +87,8 @@ impl Kernel for Optimize {
         let mut past: VecDeque<Pair> = VecDeque::new();
         for _ in 0..self.steps {
             let mut along = direction(&here.gradient, &past);
-            if !(dot(&along, &here.gradient) > 0.0) {
+            let slope = dot(&along, &here.gradient);
+            if slope.is_nan() || slope <= 0.0 {
                 past.clear();
                 along = direction(&here.gradient, &past);
             }
