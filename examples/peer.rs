@@ -6,6 +6,9 @@
 //! the time at which sampling could start, the number of transitions after warm-up, the processor time they took on their one
 //! thread, and the draws.
 
+mod clock;
+
+use clock::processor_seconds;
 use pcadlang::infer::{RunOptions, Watch};
 use pcadlang::lang::value::Value;
 use pcadlang::trace::{Draws, Trace};
@@ -41,12 +44,6 @@ impl Watch for Clock {
             seen[n - 1].0 = processor_seconds();
         }
     }
-}
-
-/// Processor time of this thread.
-fn processor_seconds() -> f64 {
-    let s = std::fs::read_to_string("/proc/thread-self/schedstat").unwrap_or_default();
-    s.split_whitespace().next().and_then(|x| x.parse::<f64>().ok()).unwrap_or(f64::NAN) / 1e9
 }
 
 fn value(j: &Json) -> Value {

@@ -1,99 +1,89 @@
 //! What one transition of a local choice costs as a program grows: outlier flags of a regression, hidden states of a chain.
 //!
-//!     cargo run --release --example transition_cost -- [MODEL] [N] [TRANSITIONS]
+//!     cargo run --release --example transition_cost -- MODEL N TRANSITIONS
 //!
-//! Without arguments, a table over both models and several sizes. Times are processor time of the one thread; for counts of
-//! instructions run it twice under `valgrind --tool=none`-like counters with different TRANSITIONS and take the difference.
+//! MODEL is `linreg` or `hmm` (programs of `benches/peers`, without their plans). Prints processor times of the one thread, and
+//! memory. For instructions, run it twice under callgrind with different TRANSITIONS and take the difference.
 
+mod clock;
+
+use clock::processor_seconds;
 use pcadlang::infer::{At, Gibbs, Kernel, Pick, Scope};
 use pcadlang::lang::value::Value;
-use pcadlang::rng::{Purpose, StreamKey};
 use pcadlang::trace::{Selector, Trace};
 use pcadlang::{Model, Program};
+use std::error::Error;
 
-fn main() {
-    let _ = (StreamKey::new(0, 0, Purpose::VALUES), Value::Unit);
+/// Transitions before the clock starts.
+const WARM: u64 = 1000;
+
+fn main() -> Result<(), Box<dyn Error>> {
     let args: Vec<String> = std::env::args().skip(1).collect();
-    let n: usize = args.get(1).and_then(|a| a.parse().ok()).unwrap_or(1000);
-    let count: usize = args.get(2).and_then(|a| a.parse().ok()).unwrap_or(100_000);
-    let clock = cpu();
-    let model = match args.first().map(String::as_str) {
-        Some("hmm") => hmm(n),
-        _ => linreg(n),
+    let [model, n, count] = &args[..] else { return Err("usage: transition_cost linreg|hmm N TRANSITIONS".into()) };
+    let (n, count): (usize, u64) = (n.parse()?, count.parse()?);
+    let begun = processor_seconds();
+    let (model, tag) = match model.as_str() {
+        "linreg" => (linreg(n)?, "flag"),
+        "hmm" => (hmm(n)?, "state"),
+        other => return Err(format!("no model `{other}`").into()),
     };
-    let loaded = cpu();
-    let mut trace = model.simulate(1, 0).unwrap_or_else(|e| panic!("{e}"));
-    let started = cpu();
-    let sel = Selector::Tag {
-        name: if args.first().map(String::as_str) == Some("hmm") { "state".into() } else { "flag".into() },
-        value: None,
-    };
-    let mut kernel = Gibbs::new(Scope { selector: sel, pick: Pick::One });
-    go(&mut kernel, &mut trace, 1000.min(count), 0);
-    let warm = cpu();
-    let accepted = go(&mut kernel, &mut trace, count, 1000);
-    let done = cpu();
+    let loaded = processor_seconds();
+    let mut trace = model.simulate(1, 0)?;
+    let started = processor_seconds();
+    let selector = Selector::Tag { name: tag.into(), value: None };
+    let mut kernel = Gibbs::new(Scope { selector, pick: Pick::One });
+    let warm = WARM.min(count);
+    run(&mut kernel, &mut trace, 0..warm)?;
+    let ready = processor_seconds();
+    let moved = run(&mut kernel, &mut trace, warm..warm + count)?;
+    let each = (processor_seconds() - ready) / count as f64 * 1e6;
     println!(
-        "n {n}: load {:.2} s, start {:.2} s, {:.3} us a transition, {accepted} moved, {} MiB",
-        loaded - clock,
+        "n {n}: load {:.2} s, start {:.2} s, {each:.3} us a transition, {moved} moved, {} MiB",
+        loaded - begun,
         started - loaded,
-        (done - warm) / count as f64 * 1e6,
-        rss()
+        resident_mib()
     );
+    Ok(())
 }
 
-fn go(kernel: &mut dyn Kernel, trace: &mut Trace, count: usize, first: u64) -> u64 {
-    let mut accepted = 0;
-    for i in 0..count {
-        let at = At::new(1, 0, first + i as u64);
-        accepted += u64::from(kernel.step(trace, &at).unwrap_or_else(|e| panic!("{e}")).accepted);
+/// Steps of a kernel; how many moved the choice.
+fn run(kernel: &mut dyn Kernel, trace: &mut Trace, steps: std::ops::Range<u64>) -> Result<u64, Box<dyn Error>> {
+    let mut moved = 0;
+    for step in steps {
+        let outcome = kernel.step(trace, &At::new(1, 0, step)).map_err(|e| e.to_string())?;
+        moved += u64::from(outcome.accepted);
     }
-    accepted
+    Ok(moved)
 }
 
 fn array(n: usize, f: impl Fn(usize) -> f64) -> Value {
     Value::Array((0..n).map(f).collect())
 }
 
-fn linreg(n: usize) -> Model {
-    let x = array(n, |i| -5.0 + 10.0 * ((i * 7919) % 1000) as f64 / 1000.0);
-    let y = array(n, |i| {
-        if i % 10 == 3 { ((i * 31) % 41) as f64 - 20.0 } else { 7.0 - 10.0 * ((i * 7919) % 1000) as f64 / 1000.0 }
-    });
+fn linreg(n: usize) -> Result<Model, Box<dyn Error>> {
+    let at = |i: usize| ((i * 7919) % 1000) as f64 / 1000.0;
+    let x = array(n, |i| -5.0 + 10.0 * at(i));
+    let y = array(n, |i| if i % 10 == 3 { ((i * 31) % 41) as f64 - 20.0 } else { 7.0 - 10.0 * at(i) });
     compile(include_str!("../benches/peers/linreg.pcad"), vec![("x", x), ("y", y)])
 }
 
-fn hmm(n: usize) -> Model {
+fn hmm(n: usize) -> Result<Model, Box<dyn Error>> {
     let y = array(n, |i| ((i / 7) % 3) as f64 * 2.0 - 2.0 + 0.1 * ((i * 31) % 17) as f64 - 0.8);
     let row = |k: usize| array(3, move |i| if i == k { 0.8 } else { 0.1 });
     let trans = Value::List(vec![row(0), row(1), row(2)].into());
-    compile(
-        include_str!("../benches/peers/hmm.pcad"),
-        vec![
-            ("y", y),
-            ("trans", trans),
-            ("mu", array(3, |i| 2.0 * i as f64 - 2.0)),
-            ("probe", Value::Num((n / 2) as f64)),
-        ],
-    )
+    let (mu, probe) = (array(3, |i| 2.0 * i as f64 - 2.0), Value::Num((n / 2) as f64));
+    compile(include_str!("../benches/peers/hmm.pcad"), vec![("y", y), ("trans", trans), ("mu", mu), ("probe", probe)])
 }
 
-fn compile(text: &str, data: Vec<(&str, Value)>) -> Model {
-    let text = text.split("infer {").next().unwrap_or(text);
-    let mut program = Program::parse(text).unwrap_or_else(|e| panic!("{e}"));
-    for (name, value) in data {
-        program = program.observe(name, value);
-    }
-    program.compile().unwrap_or_else(|e| panic!("{e}"))
+/// The model of a program; its plan is left out.
+fn compile(text: &str, data: Vec<(&str, Value)>) -> Result<Model, Box<dyn Error>> {
+    let model = text.split("infer {").next().unwrap_or(text);
+    let program = data.into_iter().fold(Program::parse(model)?, |program, (name, value)| program.observe(name, value));
+    Ok(program.compile()?)
 }
 
-/// Processor seconds of this thread.
-fn cpu() -> f64 {
-    let s = std::fs::read_to_string("/proc/self/schedstat").unwrap_or_default();
-    s.split_whitespace().next().and_then(|x| x.parse::<f64>().ok()).unwrap_or(f64::NAN) / 1e9
-}
-
-fn rss() -> u64 {
+/// Memory in use.
+fn resident_mib() -> u64 {
     let s = std::fs::read_to_string("/proc/self/status").unwrap_or_default();
     let line = s.lines().find(|l| l.starts_with("VmRSS")).unwrap_or_default();
     line.split_whitespace().nth(1).and_then(|x| x.parse::<u64>().ok()).unwrap_or(0) / 1024

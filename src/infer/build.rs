@@ -8,8 +8,9 @@ use super::plan::{RunOptions, argument, call};
 use super::selection::{fail, scope};
 use crate::lang::error::RunError;
 use crate::lang::value::Value;
-use crate::syntax::ast::{Address, Arg, Expr, ExprKind, Key};
+use crate::syntax::ast::{Address, Arg, Expr, ExprKind, KernelDecl, Key, Param};
 use crate::syntax::print_expr;
+use crate::syntax::span::Span;
 use crate::trace::Selector;
 use std::sync::Arc;
 
@@ -34,15 +35,10 @@ pub(super) fn build(
         return Err(fail(e.span, "a kernel such as mh(one(@**)) was expected".into()));
     };
     if let Some(k) = env.code.kernels.iter().find(|k| &*k.name.node == name) {
-        let code = Arc::clone(env.code);
-        let mut arguments = Vec::with_capacity(k.params.len());
-        for (i, p) in k.params.iter().enumerate() {
-            let given = argument(args, i, &p.name.node).or(p.default.as_ref());
-            let given = given.ok_or_else(|| fail(e.span, format!("the argument `{}` is missing", p.name.node)))?;
-            arguments.push((Arc::clone(&p.name.node), evaluate(given, env)?));
-        }
+        let arguments = arguments(k, args, e.span, env)?;
         let signature = format!("{name}{arguments:?}");
-        return Ok(Built { kernel: Box::new(Own::new(code, k.clone(), arguments)), signature });
+        let kernel = Own::new(Arc::clone(env.code), k.clone(), arguments, env.started);
+        return Ok(Built { kernel: Box::new(kernel), signature });
     }
     if env.code.builtins.find("", name).is_some_and(|i| env.code.builtins.get(i).is_planned()) {
         let mut e = fail(e.span, format!("the kernel `{name}` is not available yet in this version"));
@@ -102,6 +98,24 @@ pub(super) fn build(
 }
 
 const AVAILABLE: &str = "mh, block, drift, gibbs, elliptical, hmc, mala, nuts, slice, knn, temper, smc, abc, optimize";
+
+/// The values of the parameters of a declared kernel, by name.
+///
+/// # Errors
+/// If one is missing, or fails.
+pub(super) fn arguments(
+    k: &KernelDecl,
+    args: &[Arg],
+    call: Span,
+    env: &mut Scope,
+) -> Result<Vec<(Arc<str>, Value)>, Box<RunError>> {
+    let one = |(i, p): (usize, &Param)| {
+        let given = argument(args, i, &p.name.node).or(p.default.as_ref());
+        let given = given.ok_or_else(|| fail(call, format!("the argument `{}` is missing", p.name.node)))?;
+        Ok((Arc::clone(&p.name.node), evaluate(given, env)?))
+    };
+    k.params.iter().enumerate().map(one).collect()
+}
 
 /// A positive number that a kernel takes besides its selection, if it is given.
 fn positive(e: Option<&Expr>, kernel: &str, name: &str, env: &mut Scope) -> Result<Option<f64>, Box<RunError>> {

@@ -16,6 +16,7 @@ mod plan;
 mod population;
 pub mod predictive;
 mod record;
+mod resampling;
 mod selection;
 mod sites;
 

@@ -6,6 +6,7 @@
 //! (Del Moral, Doucet & Jasra 2006). The number falls geometrically as the power rises, so that those who are left get more of
 //! the time. It belongs to warm-up: the states it goes through are not draws.
 
+use super::resampling::systematic;
 use crate::rng::Stream;
 use crate::trace::{Constraint, Draws, Trace, TraceResult};
 
@@ -81,7 +82,7 @@ impl Population {
         Ok(())
     }
 
-    /// Systematic resampling (Kitagawa 1996): each member gets the whole number of offspring next to its share.
+    /// Thins the members out to so many, by what the likelihood gains.
     fn resample(&mut self, step: f64, left: usize, rng: &mut Stream) {
         // Nobody dies at an equal power, though 0 times infinity is NaN.
         let gain = |m: &(State, f64)| if step == 0.0 { 0.0 } else { step * m.1 };
@@ -90,20 +91,7 @@ impl Population {
             f64::NEG_INFINITY => vec![1.0; self.members.len()],
             _ => self.members.iter().map(|m| libm::exp(gain(m) - top)).collect(),
         };
-        let spacing = weights.iter().sum::<f64>() / left as f64;
-        let (mut at, mut reached) = (rng.uniform() * spacing, 0.0);
-        let mut chosen = Vec::with_capacity(left);
-        for (i, w) in weights.iter().enumerate() {
-            reached += w;
-            while at < reached && chosen.len() < left {
-                chosen.push(i);
-                at += spacing;
-            }
-        }
-        // Rounding may leave the last place empty.
-        let last = weights.len() - 1;
-        chosen.resize(left, last);
-        self.members = chosen.into_iter().map(|i| self.members[i].clone()).collect();
+        self.members = systematic(&weights, left, rng).into_iter().map(|i| self.members[i].clone()).collect();
     }
 }
 

@@ -145,6 +145,11 @@ impl Trace {
             }
         };
         self.graph.constraints.clear();
+        self.pend(before, settled)
+    }
+
+    /// Leaves an update pending, or undoes one that failed.
+    fn pend(&mut self, before: Before, settled: TraceResult<()>) -> TraceResult<Weight> {
         match settled {
             Ok(()) => {
                 let weight = self.graph.weight(&before.prior, &before.likelihood);

@@ -100,17 +100,8 @@ impl Trace {
                 self.graph.mark_target(&self.code, *n);
             }
         }
-        match self.graph.settle(&self.code) {
-            Ok(()) => {
-                let weight = self.graph.weight(&before.prior, &before.likelihood);
-                self.update = Some(before);
-                Ok(weight)
-            }
-            Err(e) => {
-                self.graph.rollback(&self.code, before);
-                Err(e)
-            }
-        }
+        let settled = self.graph.settle(&self.code);
+        self.pend(before, settled)
     }
 }
 

@@ -232,11 +232,7 @@ impl Kernel for Drift {
         if at.adapting && self.adaptive {
             self.adapt(key, outcome.accepted > 0, dimensions);
             if joint {
-                self.learn_spreads(trace, &targets);
-            }
-            // An annealed posterior has another shape.
-            if joint && at.power == 1.0 {
-                self.learn_shape(trace);
+                self.learn(trace, at);
             }
         }
         Ok(outcome)
@@ -252,22 +248,21 @@ fn shape_key(trace: &Trace, targets: &[Target], frees: &[Option<(Vec<f64>, f64)>
 }
 
 impl Drift {
-    /// Learns the shape of what moves together, from where the chain is now.
-    fn learn_shape(&mut self, trace: &mut Trace) {
+    /// Learns the spreads and the shape of what moves together, from where the chain is now.
+    fn learn(&mut self, trace: &mut Trace, at: &At) {
         let selection = self.scope.selection(trace);
         let targets = trace.targets(selection);
         let frees: Vec<_> = targets.iter().map(|t| trace.free(*t)).collect();
+        for (t, free) in targets.iter().zip(&frees) {
+            if let Some((y, _)) = free {
+                self.spreads.entry(trace.address_hash(*t)).or_default().add(y);
+            }
+        }
         let y: Vec<f64> = frees.iter().flatten().flat_map(|(y, _)| y.iter().copied()).collect();
-        if (2..=MOST).contains(&y.len()) {
+        // An annealed posterior has another shape.
+        if at.power == 1.0 && (2..=MOST).contains(&y.len()) {
             let key = shape_key(trace, targets, &frees);
             self.shapes.entry(key).or_insert_with(|| Shape::new(y.len())).add(&y);
-        }
-    }
-
-    fn learn_spreads(&mut self, trace: &Trace, targets: &[Target]) {
-        for t in targets {
-            let Some((y, _)) = trace.free(*t) else { continue };
-            self.spreads.entry(trace.address_hash(*t)).or_default().add(&y);
         }
     }
 }

@@ -32,8 +32,9 @@ struct Proposed {
 }
 
 impl Own {
-    pub fn new(code: Arc<Code>, declared: KernelDecl, arguments: Vec<(Arc<str>, Value)>) -> Self {
-        Own { code, declared, arguments, started: Instant::now() }
+    /// A declared kernel with the values of its parameters, in a chain that began at `started`.
+    pub fn new(code: Arc<Code>, declared: KernelDecl, arguments: Vec<(Arc<str>, Value)>, started: Instant) -> Self {
+        Own { code, declared, arguments, started }
     }
 
     /// What the body proposes in a state.
@@ -55,10 +56,10 @@ struct Play<'a> {
 }
 
 impl Play<'_> {
-    fn value(&self, e: &Expr, trace: &mut Trace, variables: &[(Arc<str>, Value)]) -> TraceResult<Value> {
-        let own = self.own;
-        let (draws, steps) = (self.draws, self.steps);
-        evaluate(e, &mut Scope { code: &own.code, trace, variables, draws, started: own.started, steps })
+    /// What expressions can see.
+    fn env<'b>(&'b self, trace: &'b mut Trace, variables: &'b [(Arc<str>, Value)]) -> Scope<'b> {
+        let (code, started) = (&self.own.code, self.own.started);
+        Scope { code, trace, variables, draws: self.draws, started, steps: self.steps }
     }
 
     fn body(&mut self, body: &[KStmt], trace: &mut Trace, variables: &mut Vec<(Arc<str>, Value)>) -> TraceResult<()> {
@@ -66,11 +67,11 @@ impl Play<'_> {
         for s in body {
             match &s.kind {
                 KStmtKind::Let { name, expr } => {
-                    let v = self.value(expr, trace, variables)?;
+                    let v = evaluate(expr, &mut self.env(trace, variables))?;
                     variables.push((Arc::clone(&name.node), v));
                 }
                 KStmtKind::For { var, iter, body } => {
-                    let over = self.value(iter, trace, variables)?;
+                    let over = evaluate(iter, &mut self.env(trace, variables))?;
                     for item in over.passes() {
                         variables.push((Arc::clone(&var.node), item));
                         let done = self.body(body, trace, variables);
@@ -104,9 +105,7 @@ impl Play<'_> {
         trace: &mut Trace,
         variables: &[(Arc<str>, Value)],
     ) -> TraceResult<Proposed> {
-        let own = self.own;
-        let (draws, steps) = (self.draws, self.steps);
-        let mut env = Scope { code: &own.code, trace, variables, draws, started: own.started, steps };
+        let mut env = self.env(trace, variables);
         let at = address(target, &mut env)?;
         let dist = match evaluate(dist, &mut env)? {
             Value::Dist(d) => Dist::clone(&d),

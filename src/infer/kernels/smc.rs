@@ -7,9 +7,9 @@
 //! found in the first run, so that half of the weights count at each, and stay as they are.
 
 use crate::infer::kernel::{At, Kernel, Outcome, accepts, inner_step};
+use crate::infer::resampling::systematic;
 use crate::infer::selection::fail;
 use crate::num::log_sum_exp;
-use crate::rng::Stream;
 use crate::syntax::span::Span;
 use crate::trace::{Constraint, Selector, Trace, TraceResult};
 
@@ -72,7 +72,9 @@ impl Smc {
                 return Ok((particles, total));
             }
             let within = at.within((1 << 32) + rung as u64);
-            particles = resampled(&particles, &weights, total, &mut within.stream());
+            let shares: Vec<f64> = weights.iter().map(|w| libm::exp(w - total)).collect();
+            let chosen = systematic(&shares, self.particles, &mut within.stream());
+            particles = chosen.into_iter().map(|i| particles[i].clone()).collect();
             for (i, p) in particles.iter_mut().enumerate() {
                 inner_step(&mut *self.kernel, p, &At { power: at.power * power, ..within.within(i as u64) })?;
             }
@@ -97,25 +99,6 @@ fn next_power(likelihoods: &[f64], power: f64) -> f64 {
         if enough(middle) { low = middle } else { high = middle }
     }
     if low > power { low } else { high }
-}
-
-/// Systematic resampling (Kitagawa 1996).
-fn resampled(particles: &[Trace], log_weights: &[f64], total: f64, rng: &mut Stream) -> Vec<Trace> {
-    let n = particles.len();
-    let mut at = rng.uniform();
-    let (mut reached, mut chosen) = (0.0, Vec::with_capacity(n));
-    for (p, w) in particles.iter().zip(log_weights) {
-        reached += libm::exp(w - total) * n as f64;
-        while at < reached && chosen.len() < n {
-            chosen.push(p.clone());
-            at += 1.0;
-        }
-    }
-    // Rounding may leave the last place empty.
-    while let (true, Some(last)) = (chosen.len() < n, chosen.last().cloned()) {
-        chosen.push(last);
-    }
-    chosen
 }
 
 impl Kernel for Smc {

@@ -3,7 +3,7 @@
 pub(super) mod banks;
 mod warmup;
 
-use super::build::{build, is_constant};
+use super::build::{arguments, build, is_constant};
 use super::draws::{DrawRow, KernelStats, Sink, SiteStats};
 use super::expr::{Scope, evaluate};
 use super::init::{StartError, start_of, starts};
@@ -264,17 +264,15 @@ impl Runner<'_> {
         Draws { key, step: self.step, lane: 0 }
     }
 
-    fn value(&mut self, e: &Expr) -> Result<Value, Box<RunError>> {
+    /// What expressions can see.
+    fn env(&mut self) -> Scope<'_> {
         let draws = self.predictive();
-        let mut env = Scope {
-            code: self.code,
-            trace: &mut self.trace,
-            variables: &self.variables,
-            draws,
-            started: self.started,
-            steps: self.step,
-        };
-        evaluate(e, &mut env)
+        let (started, steps) = (self.started, self.step);
+        Scope { code: self.code, trace: &mut self.trace, variables: &self.variables, draws, started, steps }
+    }
+
+    fn value(&mut self, e: &Expr) -> Result<Value, Box<RunError>> {
+        evaluate(e, &mut self.env())
     }
 
     fn count(&mut self, e: &Expr) -> Result<u64, Box<RunError>> {
@@ -287,16 +285,7 @@ impl Runner<'_> {
     /// Applies the program's `freeze`.
     fn freeze(&mut self) -> Result<(), ChainError> {
         for f in &self.code.freezes {
-            let draws = self.predictive();
-            let mut env = Scope {
-                code: self.code,
-                trace: &mut self.trace,
-                variables: &[],
-                draws,
-                started: self.started,
-                steps: 0,
-            };
-            let s = selector(f, &mut env)?;
+            let s = selector(f, &mut self.env())?;
             self.frozen = match std::mem::replace(&mut self.frozen, Selector::Nothing) {
                 Selector::Nothing => s,
                 old => Selector::Union(Box::new(old), Box::new(s)),
@@ -455,13 +444,13 @@ impl Runner<'_> {
             "anneal" => return self.anneal(e, args),
             _ => {}
         }
-        if let Some(k) = self.code.kernels.iter().find(|k| &*k.name.node == name && !proposes(&k.body)) {
-            return self.apply_declared(e, k, args);
-        }
         let place = e as *const Expr as usize;
         let i = match self.places.get(&place) {
             Some(i) => *i,
-            None => self.instance(e, place)?,
+            None => match self.code.kernels.iter().find(|k| &*k.name.node == name && !proposes(&k.body)) {
+                Some(k) => return self.apply_declared(e, k, args),
+                None => self.instance(e, place)?,
+            },
         };
         let begun = Instant::now();
         let mut flow = Flow::Next;
@@ -487,13 +476,9 @@ impl Runner<'_> {
 
     /// Applies a kernel that the program declares from other kernels.
     fn apply_declared(&mut self, e: &Expr, k: &KernelDecl, args: &[Arg]) -> Result<Flow, ChainError> {
+        let given = arguments(k, args, e.span, &mut self.env())?;
         let depth = self.variables.len();
-        for (i, p) in k.params.iter().enumerate() {
-            let given = argument(args, i, &p.name.node).or(p.default.as_ref());
-            let given = given.ok_or_else(|| fail(e.span, format!("the argument `{}` is missing", p.name.node)))?;
-            let v = self.value(given)?;
-            self.variables.push((Arc::clone(&p.name.node), v));
-        }
+        self.variables.extend(given);
         let flow = self.body(&k.body);
         self.variables.truncate(depth);
         flow
@@ -513,16 +498,8 @@ impl Runner<'_> {
 
     /// The kernel a call stands for: one that is known, or a new one.
     fn instance(&mut self, e: &Expr, place: usize) -> Result<usize, ChainError> {
-        let draws = self.predictive();
-        let mut env = Scope {
-            code: self.code,
-            trace: &mut self.trace,
-            variables: &self.variables,
-            draws,
-            started: self.started,
-            steps: self.step,
-        };
-        let built = build(e, &self.frozen, self.options, &mut env)?;
+        let (frozen, options) = (self.frozen.clone(), self.options);
+        let built = build(e, &frozen, options, &mut self.env())?;
         let i = match self.instances.iter().position(|i| i.signature == built.signature) {
             Some(i) => i,
             None => {
