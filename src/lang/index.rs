@@ -53,7 +53,7 @@ fn position(base: &Value, x: f64) -> Result<Value, Fault> {
 }
 
 /// The index that `x` is into so many elements.
-fn place(len: usize, x: f64) -> Option<usize> {
+pub(crate) fn place(len: usize, x: f64) -> Option<usize> {
     (x >= 0.0 && x < len as f64 && x == libm::trunc(x)).then_some(x as usize)
 }
 

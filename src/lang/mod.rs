@@ -8,6 +8,7 @@ pub mod builtins;
 pub mod code;
 pub mod error;
 mod flatten;
+pub mod formula;
 pub mod index;
 pub mod key;
 pub mod load;

@@ -2,6 +2,7 @@
 //! although nothing asks for it, how the change of a choice spreads.
 
 use super::code::{Block, Callee, Code, Op, Operand, Slot};
+use super::formula::Formula;
 use super::value::Value;
 
 /// What updates need to know of a slot.
@@ -21,6 +22,8 @@ pub struct SlotFacts {
     pub users: Box<[Slot]>,
     /// For a choice that only computations of its own block depend on: how its change spreads.
     pub spread: Option<Spread>,
+    /// For a choice or an element of an array: what another number there does to the scores of its block.
+    pub formula: Option<Box<Formula>>,
 }
 
 /// The part of a choice's scaffold that lies in its own block, where that is the same in every state.
@@ -67,16 +70,21 @@ impl Code {
                     reads: op.reads(),
                     users: users.into(),
                     spread: None,
+                    formula: None,
                 });
                 self.ops.push(op);
             }
-            let slots = &self.slots[block.first as usize..];
-            let spreads: Vec<_> = (0..slots.len())
-                .filter(|s| slots[*s].is_draw)
-                .map(|s| (s, super::spread::spread(&self.ops[block.first as usize..], slots, s as Slot)))
+            let (ops, slots) = (&self.ops[block.first as usize..], &self.slots[block.first as usize..]);
+            let found: Vec<_> = (0..slots.len() as Slot)
+                .filter(|s| matches!(ops[*s as usize], Op::Draw { .. } | Op::Index { .. }))
+                .map(|s| {
+                    let spread = if slots[s as usize].is_draw { super::spread::spread(ops, slots, s) } else { None };
+                    (s, spread, Formula::new(ops, slots, s, &self.builtins).map(Box::new))
+                })
                 .collect();
-            for (slot, spread) in spreads {
-                self.slots[block.first as usize + slot].spread = spread;
+            for (slot, spread, formula) in found {
+                let facts = &mut self.slots[block.first as usize + slot as usize];
+                (facts.spread, facts.formula) = (spread, formula);
             }
         }
     }

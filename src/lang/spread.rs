@@ -11,17 +11,27 @@ const LONGEST: usize = 64;
 
 /// The spread of the choice in slot `from` of a block, if it is the same in every state.
 pub(super) fn spread(ops: &[Op], slots: &[SlotFacts], from: Slot) -> Option<Spread> {
-    let mut reached = vec![false; slots.len()];
-    let mut order = Vec::new();
-    visit(ops, slots, from, &mut reached, &mut order)?;
-    order.pop();
-    order.reverse();
+    let order = dependents(ops, slots, from)?;
+    // A keyed choice may turn into another one.
+    if order.iter().any(|s| matches!(&ops[*s as usize], Op::Draw { keys, .. } if !keys.is_empty())) {
+        return None;
+    }
     let local = |s: &Slot| match &ops[*s as usize] {
         Op::Select { then, otherwise, .. } => ![then, otherwise].iter().any(|o| matches!(o, Operand::Outer { .. })),
         _ => slots[*s as usize].reads.as_ref().is_some_and(|reads| reads.iter().all(|(up, _)| *up == 0)),
     };
     let is_closed = order.iter().all(local);
     Some(Spread { slots: order.into(), is_closed })
+}
+
+/// What depends on a slot in its block, each after what it reads, up to and including observations and other choices, if that
+/// is the same in every state.
+pub(super) fn dependents(ops: &[Op], slots: &[SlotFacts], from: Slot) -> Option<Vec<Slot>> {
+    let (mut reached, mut order) = (vec![false; slots.len()], Vec::new());
+    visit(ops, slots, from, &mut reached, &mut order)?;
+    order.pop();
+    order.reverse();
+    Some(order)
 }
 
 /// Depth first: users before what they read, so that the reverse is an order of evaluation.
@@ -43,7 +53,7 @@ fn visit(ops: &[Op], slots: &[SlotFacts], slot: Slot, reached: &mut [bool], orde
                 order.push(*user);
             }
             // A choice keeps its value when its parameters change, unless it is of a form that is seen only when it runs.
-            Op::Draw { dist: DistSpec::Family { .. }, keys, .. } if keys.is_empty() => {
+            Op::Draw { dist: DistSpec::Family { .. }, .. } => {
                 reached[*user as usize] = true;
                 order.push(*user);
             }

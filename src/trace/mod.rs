@@ -7,6 +7,7 @@
 mod choices;
 mod demand;
 mod eval;
+mod formula;
 mod gradient;
 mod graph;
 mod journal;
@@ -163,27 +164,39 @@ impl Trace {
         }
     }
 
-    /// The weights that the values of a choice would have in an update, each relative to the present state (that of the
+    /// The weights that the values of a choice with this distribution would have in an update, each relative to the present state (that of the
     /// `current` one is 0); `None` for values that the program does not have. False if that takes updates, since structure depends on the choice.
     pub(crate) fn weigh_values(
         &self,
         target: Target,
+        dist: &Dist,
         values: &[Datum],
         current: usize,
         peek: &mut Peek,
         mut weight: impl FnMut(Option<Weight>),
     ) -> TraceResult<bool> {
         let g = &self.graph;
-        if self.update.is_some() || target.element != NONE || !g.peek_at(&self.code, target.node, peek) {
+        if self.update.is_some() || target.element != NONE {
             return Ok(false);
         }
-        let Some(dist) = g.dist_of(&self.code, target.node) else { return Ok(false) };
+        let formulas = g.formulas(&self.code, target.node);
+        let mut peeked = false;
         for (i, v) in values.iter().enumerate() {
             if i == current {
                 weight(Some(Weight::default()));
                 continue;
             }
-            match g.peek(&self.code, peek, &dist, v) {
+            if let Some(f) = &formulas
+                && let Some(w) = g.weigh(&self.code, target.node, f, dist, v)
+            {
+                weight(Some(w));
+                continue;
+            }
+            if !peeked && !g.peek_at(&self.code, target.node, peek) {
+                return Ok(false);
+            }
+            peeked = true;
+            match g.peek(&self.code, peek, dist, v) {
                 Ok(w) => weight(Some(w)),
                 Err(Obstacle::Fault(e)) if e.is_recoverable() => weight(None),
                 Err(_) => return Ok(false),

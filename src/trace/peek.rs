@@ -97,7 +97,7 @@ impl Graph {
     }
 
     /// A single number or truth value, stored as the program sees it.
-    fn is_plain_choice(&self, n: NodeId) -> bool {
+    pub fn is_plain_choice(&self, n: NodeId) -> bool {
         let node = &self.nodes[n as usize];
         let whole = match node.side.as_deref() {
             None => true,
@@ -155,16 +155,7 @@ impl Graph {
                 _ => return Err(Obstacle::Unsuitable),
             }
         }
-        let none = ExactSum::default();
-        let log_joint = ExactSum::balance([&prior, &likelihood, &none], [&none, &none, &none]);
-        Ok(Weight {
-            log_weight: log_joint,
-            log_joint,
-            log_likelihood: ExactSum::difference(&likelihood, &none),
-            log_jacobian: 0.0,
-            appeared: 0,
-            vanished: 0,
-        })
+        Ok(Weight::beside(&prior, &likelihood))
     }
 
     fn peek_all(

@@ -75,6 +75,16 @@ pub struct Weight {
     pub vanished: u32,
 }
 
+impl Weight {
+    /// What an update would do that changes these sums by these terms, and no structure.
+    pub(crate) fn beside(prior: &ExactSum, likelihood: &ExactSum) -> Self {
+        let none = ExactSum::default();
+        let log_joint = ExactSum::balance([prior, likelihood, &none], [&none, &none, &none]);
+        let log_likelihood = ExactSum::difference(likelihood, &none);
+        Weight { log_weight: log_joint, log_joint, log_likelihood, ..Weight::default() }
+    }
+}
+
 impl Graph {
     /// The pending changes of a choice.
     pub fn pending_of(&self, n: NodeId) -> impl Iterator<Item = &Pending> {

@@ -35,7 +35,8 @@ impl Graph {
         (spread.is_closed || !leaves).then_some(spread)
     }
 
-    fn is_read_outside(&self, n: NodeId) -> bool {
+    /// Whether nodes of other frames read this one.
+    pub fn is_read_outside(&self, n: NodeId) -> bool {
         let users = &self.outside[self.nodes[n as usize].outside as usize];
         users.users.len() > users.gone as usize
     }

@@ -5,7 +5,7 @@
 //! Liang & Wong 2000) with one try a value: the weights around the new state, with fresh draws for all values but the old
 //! one, make the ratio.
 
-use crate::dist::Datum;
+use crate::dist::{Datum, Dist};
 use crate::infer::kernel::{At, Kernel, Outcome, Registered, Scope, accepts, recoverable};
 use crate::num::log_sum_exp;
 use crate::rng::Stream;
@@ -44,6 +44,7 @@ impl Gibbs {
         trace: &mut Trace,
         at: &At,
         target: Target,
+        dist: &Dist,
         ways: f64,
         current: usize,
         first_lane: u64,
@@ -51,7 +52,7 @@ impl Gibbs {
         let mut weighed = Weighed::default();
         let log = &mut self.log;
         log.clear();
-        let by_peek = trace.weigh_values(target, &self.values, current, &mut self.peek, |w| {
+        let by_peek = trace.weigh_values(target, dist, &self.values, current, &mut self.peek, |w| {
             weighed.failed += u32::from(w.is_none());
             let weight = w.map_or(f64::NEG_INFINITY, |w| at.tempered(&w));
             log.push(if weight.is_nan() { f64::NEG_INFINITY } else { weight });
@@ -98,13 +99,13 @@ impl Kernel for Gibbs {
         let mut rng = at.stream();
         let Some((target, n)) = self.scope.pick(trace, at, &mut rng) else { return Ok(Outcome::default()) };
         let stored = trace.stored(target);
-        if !trace.dist(target).is_some_and(|d| d.support().list_values(&mut self.values)) {
+        let Some(dist) = trace.dist(target).filter(|d| d.support().list_values(&mut self.values)) else {
             return Ok(Outcome::default());
-        }
+        };
         let Some(old) = self.values.iter().position(|v| Some(v) == stored.as_ref()) else {
             return Ok(Outcome::default());
         };
-        let forward = self.weigh(trace, at, target, libm::log(n as f64), old, 0)?;
+        let forward = self.weigh(trace, at, target, &dist, libm::log(n as f64), old, 0)?;
         let chosen = sample_log(&self.log, &mut rng);
         let mut outcome = Outcome { proposals: 1, failed: forward.failed, ..Default::default() }.at(target);
         if chosen == old {
@@ -127,7 +128,7 @@ impl Kernel for Gibbs {
         let removed = trace.removed();
         trace.commit();
         let ways = self.scope.ways_back(trace);
-        self.weigh(trace, at, target, ways, chosen, self.values.len() as u64)?;
+        self.weigh(trace, at, target, &dist, ways, chosen, self.values.len() as u64)?;
         trace.rollback();
         // The old state itself stands for the old value: its weight back is minus its weight forth.
         self.log[old] = -forth;

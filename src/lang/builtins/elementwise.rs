@@ -3,10 +3,26 @@
 //! The rule: two arrays need equal lengths; anything else is paired with every element. Plain numbers come first because
 //! nearly every call in a model has them.
 
-use super::Args;
+use super::{Args, Scalar};
 use crate::lang::error::Fault;
 use crate::lang::value::Value;
 use std::sync::Arc;
+
+/// The function that the table has for single numbers, on numbers and arrays of them.
+pub(super) fn mapped(a: &Args) -> Result<Value, Fault> {
+    match a.builtin.scalar {
+        Some(Scalar::Unary(f)) => unary(a, f),
+        _ => binary(a, of_two(a)),
+    }
+}
+
+/// The function of two numbers that the table has.
+pub(super) fn of_two(a: &Args) -> fn(f64, f64) -> f64 {
+    match a.builtin.scalar {
+        Some(Scalar::Binary(f)) => f,
+        _ => |_, _| f64::NAN,
+    }
+}
 
 /// A function of one number.
 pub(super) fn unary(a: &Args, f: fn(f64) -> f64) -> Result<Value, Fault> {
@@ -35,7 +51,7 @@ pub(super) fn numeric(
     x: &Value,
     y: &Value,
     f: fn(f64, f64) -> f64,
-    other: Scalar<'_>,
+    other: Pairing<'_>,
 ) -> Result<Value, Fault> {
     match (x, y) {
         (Value::Num(x), Value::Num(y)) => Ok(Value::Num(f(*x, *y))),
@@ -52,10 +68,10 @@ pub(super) fn numeric(
 }
 
 /// What [`broadcast`] does with two values of which neither is an array.
-pub(super) type Scalar<'a> = &'a dyn Fn(&Value, &Value) -> Result<Value, Fault>;
+pub(super) type Pairing<'a> = &'a dyn Fn(&Value, &Value) -> Result<Value, Fault>;
 
 /// Pairs the elements of two values, down to those that are no arrays.
-pub(super) fn broadcast(a: &Args, x: &Value, y: &Value, f: Scalar<'_>) -> Result<Value, Fault> {
+pub(super) fn broadcast(a: &Args, x: &Value, y: &Value, f: Pairing<'_>) -> Result<Value, Fault> {
     match common_len(a, x, y)? {
         None => f(x, y),
         Some(n) => {

@@ -1,9 +1,9 @@
 //! Functions of numbers, element by element on arrays, through libm so that they are the same on every platform.
 
 use super::derivative::{self, of_two, one_of};
-use super::elementwise::{binary, numeric, unary};
+use super::elementwise::{mapped, numeric};
 use super::reduce::{largest, smallest};
-use super::{Arg, Args, Builtin, Pulled, Type, arg, function};
+use super::{Arg, Args, Builtin, Pulled, Scalar, Type, arg, function};
 use crate::lang::adjoint::Adjoint;
 use crate::lang::error::Fault;
 use crate::lang::value::Value;
@@ -16,14 +16,15 @@ const ANGLE: &[Arg] = &[arg("x", Type::Nums, "An angle.").unit("radians")];
 /// The row of a function of one number with its slope, of x and y.
 macro_rules! smooth {
     ($name:literal, $args:ident, $doc:literal, $f:expr, $slope:expr) => {
-        function($name, SECTION, $args, Type::Nums, $doc, |a| unary(a, $f))
+        function($name, SECTION, $args, Type::Nums, $doc, mapped)
+            .scalar(Scalar::Unary($f))
             .pull(|a, y, by| derivative::unary(a, y, by, $slope))
     };
 }
 
 /// Constant between jumps.
-const fn steps(name: &'static str, doc: &'static str, f: fn(&Args) -> Result<Value, Fault>) -> Builtin {
-    function(name, SECTION, X, Type::Nums, doc, f).flat()
+const fn steps(name: &'static str, doc: &'static str, f: fn(f64) -> f64) -> Builtin {
+    function(name, SECTION, X, Type::Nums, doc, mapped).scalar(Scalar::Unary(f)).flat()
 }
 
 pub(super) const TABLE: &[Builtin] = &[
@@ -38,15 +39,16 @@ pub(super) const TABLE: &[Builtin] = &[
         &[arg("x", Type::Nums, "The base."), arg("y", Type::Nums, "The exponent.")],
         Type::Nums,
         "`x ** y`.",
-        |a| binary(a, libm::pow),
+        mapped,
     )
+    .scalar(Scalar::Binary(libm::pow))
     .pull(|a, z, by| of_two(a, z, by, pow_slopes)),
     smooth!("abs", X, "The absolute value.", f64::abs, |x, _| sign(x)),
-    steps("sign", "-1, 0 or 1.", |a| unary(a, sign)),
-    steps("step", "0 below 0, 1 from 0 on.", |a| unary(a, step)),
-    steps("floor", "The next whole number below.", |a| unary(a, libm::floor)),
-    steps("ceil", "The next whole number above.", |a| unary(a, libm::ceil)),
-    steps("round", "The nearest whole number, halves away from 0.", |a| unary(a, libm::round)),
+    steps("sign", "-1, 0 or 1.", sign),
+    steps("step", "0 below 0, 1 from 0 on.", step),
+    steps("floor", "The next whole number below.", libm::floor),
+    steps("ceil", "The next whole number above.", libm::ceil),
+    steps("round", "The nearest whole number, halves away from 0.", libm::round),
     function(
         "min",
         SECTION,
@@ -93,8 +95,9 @@ pub(super) const TABLE: &[Builtin] = &[
         &[arg("y", Type::Nums, "The height."), arg("x", Type::Nums, "The width.")],
         Type::Nums,
         "The angle of the point (x, y) in [-pi, pi], in radians.",
-        |a| binary(a, libm::atan2),
+        mapped,
     )
+    .scalar(Scalar::Binary(libm::atan2))
     .pull(|a, z, by| {
         of_two(a, z, by, |y, x, _| {
             let square = x * x + y * y;
@@ -110,8 +113,9 @@ pub(super) const TABLE: &[Builtin] = &[
         &[arg("x", Type::Nums, "An angle.").unit("degrees")],
         Type::Nums,
         "Degrees in radians: `deg(180)` is pi.",
-        |a| unary(a, |x| x * (std::f64::consts::PI / 180.0)),
+        mapped,
     )
+    .scalar(Scalar::Unary(|x| x * (std::f64::consts::PI / 180.0)))
     .pull(|a, y, by| derivative::unary(a, y, by, |_, _| std::f64::consts::PI / 180.0)),
     smooth!("logit", X, "`log(p / (1 - p))`, for probabilities.", logit, |x, _| 1.0 / (x * (1.0 - x))),
     smooth!("expit", X, "`1 / (1 + exp(-x))`, the inverse of `logit`.", expit, |_, y| y * (1.0 - y)),

@@ -146,6 +146,20 @@ pub enum Kind {
     Inference,
 }
 
+/// What a function is on single numbers, where that is all there is to it: what formulas of scores run, and what functions
+/// of arrays do with each element.
+#[derive(Clone, Copy)]
+pub enum Scalar {
+    /// A number of a number.
+    Unary(fn(f64) -> f64),
+    /// A number of two.
+    Binary(fn(f64, f64) -> f64),
+    /// A truth value of two numbers.
+    Test(fn(f64, f64) -> bool),
+    /// A truth value of a truth value.
+    Logic(fn(bool) -> bool),
+}
+
 /// One built-in.
 #[derive(Clone, Copy)]
 pub struct Builtin {
@@ -165,6 +179,8 @@ pub struct Builtin {
     pub doc: &'static str,
     /// What it is.
     pub kind: Kind,
+    /// What it is on single numbers.
+    pub scalar: Option<Scalar>,
     /// Its derivative.
     pub derivative: Derivative,
 }
@@ -198,7 +214,12 @@ impl Builtin {
         doc: &'static str,
     ) -> Builtin {
         let derivative = Derivative::Unknown;
-        Builtin { name, module: "", section, args, variadic: false, returns, doc, kind, derivative }
+        Builtin { name, module: "", section, args, variadic: false, returns, doc, kind, scalar: None, derivative }
+    }
+
+    /// The same, known to be this on single numbers.
+    const fn scalar(self, f: Scalar) -> Builtin {
+        Builtin { scalar: Some(f), ..self }
     }
 
     /// The same with a last argument that may be given any number of times.

@@ -5,9 +5,9 @@
 use super::args::MAX_ELEMENTS;
 use super::covariance::CovarianceValue;
 use super::derivative::{self, of_two};
-use super::elementwise::{array, array_len, broadcast, numeric, unary};
+use super::elementwise::{self, array, array_len, broadcast, mapped, numeric};
 use super::math::pow_slopes;
-use super::{Arg, Args, Builtin, Type, arg, function};
+use super::{Arg, Args, Builtin, Scalar, Type, arg, function};
 use crate::lang::error::Fault;
 use crate::lang::value::Value;
 use std::cmp::Ordering;
@@ -21,15 +21,16 @@ const fn infix(name: &'static str, returns: Type, doc: &'static str, f: fn(&Args
 }
 
 pub(super) const TABLE: &[Builtin] = &[
-    infix("+", Type::Any, "Sum of numbers, element by element; joins two strings; adds covariances.", add).pull(
-        |a, z, by| match z {
+    infix("+", Type::Any, "Sum of numbers, element by element; joins two strings; adds covariances.", add)
+        .scalar(Scalar::Binary(|x, y| x + y))
+        .pull(|a, z, by| match z {
             Value::Object(_) => {
                 CovarianceValue::pull_both(a.get(0), a.get(1), by).map(|both| both.into_iter().collect())
             }
             _ => of_two(a, z, by, |_, _, _| [1.0, 1.0]),
-        },
-    ),
-    infix("-", Type::Nums, "Difference, element by element.", |a| arithmetic(a, |x, y| x - y))
+        }),
+    infix("-", Type::Nums, "Difference, element by element.", arithmetic)
+        .scalar(Scalar::Binary(|x, y| x - y))
         .pull(|a, z, by| of_two(a, z, by, |_, _, _| [1.0, -1.0])),
     infix(
         "*",
@@ -37,17 +38,19 @@ pub(super) const TABLE: &[Builtin] = &[
         "Product of numbers, element by element; applies a placement to a solid; multiplies covariances.",
         multiply,
     )
+    .scalar(Scalar::Binary(|x, y| x * y))
     .pull(|a, z, by| match (a.get(0), z) {
         (Value::Object(o), Value::Object(_)) => o.pull_product(a.get(1), by).map(|both| both.into_iter().collect()),
         _ => of_two(a, z, by, |x, y, _| [y, x]),
     }),
-    infix("/", Type::Nums, "Quotient, element by element; by zero it is an infinity or NaN.", |a| {
-        arithmetic(a, |x, y| x / y)
-    })
-    .pull(|a, z, by| of_two(a, z, by, |_, y, z| [1.0 / y, -z / y])),
-    infix("%", Type::Nums, "Remainder with the sign of the divisor: `-1 % 3` is 2.", |a| arithmetic(a, remainder))
+    infix("/", Type::Nums, "Quotient, element by element; by zero it is an infinity or NaN.", arithmetic)
+        .scalar(Scalar::Binary(|x, y| x / y))
+        .pull(|a, z, by| of_two(a, z, by, |_, y, z| [1.0 / y, -z / y])),
+    infix("%", Type::Nums, "Remainder with the sign of the divisor: `-1 % 3` is 2.", arithmetic)
+        .scalar(Scalar::Binary(remainder))
         .pull(|a, z, by| of_two(a, z, by, |x, y, _| [1.0, -libm::floor(x / y)])),
-    infix("**", Type::Nums, "Power, element by element.", |a| arithmetic(a, libm::pow))
+    infix("**", Type::Nums, "Power, element by element.", arithmetic)
+        .scalar(Scalar::Binary(libm::pow))
         .pull(|a, z, by| of_two(a, z, by, pow_slopes)),
     function(
         "neg",
@@ -55,8 +58,9 @@ pub(super) const TABLE: &[Builtin] = &[
         &[arg("a", Type::Nums, "What is negated.")],
         Type::Nums,
         "Negation `-a`, element by element.",
-        negate,
+        mapped,
     )
+    .scalar(Scalar::Unary(|x| -x))
     .pull(|a, y, by| derivative::unary(a, y, by, |_, _| -1.0)),
     function(
         "not",
@@ -66,6 +70,7 @@ pub(super) const TABLE: &[Builtin] = &[
         "Logical negation, element by element.",
         not,
     )
+    .scalar(Scalar::Logic(|b| !b))
     .flat(),
     infix(
         "==",
@@ -73,12 +78,21 @@ pub(super) const TABLE: &[Builtin] = &[
         "Equality of any two values; arrays are compared element by element (`all(a == b)` is one bool).",
         |a| equality(a, true),
     )
+    .scalar(Scalar::Test(|x, y| x == y))
     .flat(),
-    infix("!=", Type::Any, "The opposite of `==`.", |a| equality(a, false)).flat(),
-    infix("<", Type::Any, "Order of numbers or strings, element by element.", |a| compare(a, Ordering::is_lt)).flat(),
-    infix("<=", Type::Any, "Order of numbers or strings, element by element.", |a| compare(a, Ordering::is_le)).flat(),
-    infix(">", Type::Any, "Order of numbers or strings, element by element.", |a| compare(a, Ordering::is_gt)).flat(),
-    infix(">=", Type::Any, "Order of numbers or strings, element by element.", |a| compare(a, Ordering::is_ge)).flat(),
+    infix("!=", Type::Any, "The opposite of `==`.", |a| equality(a, false)).scalar(Scalar::Test(|x, y| x != y)).flat(),
+    infix("<", Type::Any, "Order of numbers or strings, element by element.", |a| compare(a, Ordering::is_lt))
+        .scalar(Scalar::Test(|x, y| x < y))
+        .flat(),
+    infix("<=", Type::Any, "Order of numbers or strings, element by element.", |a| compare(a, Ordering::is_le))
+        .scalar(Scalar::Test(|x, y| x <= y))
+        .flat(),
+    infix(">", Type::Any, "Order of numbers or strings, element by element.", |a| compare(a, Ordering::is_gt))
+        .scalar(Scalar::Test(|x, y| x > y))
+        .flat(),
+    infix(">=", Type::Any, "Order of numbers or strings, element by element.", |a| compare(a, Ordering::is_ge))
+        .scalar(Scalar::Test(|x, y| x >= y))
+        .flat(),
     function(
         "..",
         SECTION,
@@ -94,14 +108,14 @@ pub(super) const TABLE: &[Builtin] = &[
 ];
 
 fn add(a: &Args) -> Result<Value, Fault> {
-    numeric(a, a.get(0), a.get(1), |x, y| x + y, &|x, y| match (x, y) {
+    numeric(a, a.get(0), a.get(1), elementwise::of_two(a), &|x, y| match (x, y) {
         (Value::Str(x), Value::Str(y)) => Ok(Value::Str(format!("{x}{y}").into())),
         _ => CovarianceValue::sum(x, y).ok_or_else(|| unsuited(a, "numbers or strings", x, y)),
     })
 }
 
 fn multiply(a: &Args) -> Result<Value, Fault> {
-    numeric(a, a.get(0), a.get(1), |x, y| x * y, &|x, y| {
+    numeric(a, a.get(0), a.get(1), elementwise::of_two(a), &|x, y| {
         let product = if let Value::Object(o) = x { o.multiply(y) } else { None };
         match product {
             Some(p) => p.map_err(Fault::type_error),
@@ -110,21 +124,14 @@ fn multiply(a: &Args) -> Result<Value, Fault> {
     })
 }
 
-fn arithmetic(a: &Args, f: fn(f64, f64) -> f64) -> Result<Value, Fault> {
-    numeric(a, a.get(0), a.get(1), f, &|x, y| Err(unsuited(a, "numbers", x, y)))
+fn arithmetic(a: &Args) -> Result<Value, Fault> {
+    numeric(a, a.get(0), a.get(1), elementwise::of_two(a), &|x, y| Err(unsuited(a, "numbers", x, y)))
 }
 
 /// `x - y floor(x / y)`, exact where IEEE's remainder is.
 fn remainder(x: f64, y: f64) -> f64 {
     let r = x % y;
     if r != 0.0 && (r < 0.0) != (y < 0.0) { r + y } else { r }
-}
-
-fn negate(a: &Args) -> Result<Value, Fault> {
-    match a.get(0) {
-        Value::Num(x) => Ok(Value::Num(-x)),
-        _ => unary(a, |x| -x),
-    }
 }
 
 fn not(a: &Args) -> Result<Value, Fault> {

@@ -105,3 +105,32 @@ fn no_function_panics_on_values_of_any_type() {
     }
     assert!(calls > 50_000);
 }
+
+#[test]
+fn forms_for_single_numbers_are_the_functions_themselves() {
+    let numbers = [-2.5, -1.0, -0.0, 0.0, 0.3, 1.0, 7.0, f64::INFINITY, f64::NAN];
+    let mut seen = 0;
+    for b in crate::lang::builtins::table::all() {
+        let Some(scalar) = b.scalar else { continue };
+        let call = |values: &[Value]| {
+            let values: Vec<&Value> = values.iter().collect();
+            match b.kind {
+                Kind::Function(f) => f(&Args { builtin: b, values: &values }).unwrap(),
+                _ => panic!("{} is no function", b.name),
+            }
+        };
+        seen += 1;
+        for x in numbers {
+            for y in numbers {
+                let (found, wanted) = match scalar {
+                    Scalar::Unary(f) => (Value::Num(f(x)), call(&[Value::Num(x)])),
+                    Scalar::Binary(f) => (Value::Num(f(x, y)), call(&[Value::Num(x), Value::Num(y)])),
+                    Scalar::Test(f) => (Value::Bool(f(x, y)), call(&[Value::Num(x), Value::Num(y)])),
+                    Scalar::Logic(f) => (Value::Bool(f(x > 0.0)), call(&[Value::Bool(x > 0.0)])),
+                };
+                assert!(found.same(&wanted), "{}({x}, {y}): {found} or {wanted}", b.name);
+            }
+        }
+    }
+    assert!(seen > 30, "{seen}");
+}

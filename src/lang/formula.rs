@@ -1,0 +1,306 @@
+//! Formulas: what another value of a choice does to the scores beside it, as a short program over single numbers.
+//!
+//! Most choices are single numbers that feed a little arithmetic and a few scores of the same block. For those the scores
+//! under another value can be had without touching the trace: this is the code for it, made once for each slot. It covers
+//! what has a form on single numbers (see [`Scalar`]) and gives up on all else, at run time as well: then the general way
+//! decides, so a formula needs to be right only where it answers.
+
+use super::builtins::{Scalar, Table};
+use super::code::{DistSpec, Op, Operand, Slot, SlotFacts};
+
+/// The most registers of a formula.
+pub const REGISTERS: usize = 24;
+
+/// The most parameters of a distribution in a formula.
+pub const PARAMETERS: usize = 4;
+
+/// The most steps worth keeping.
+const LONGEST: usize = 96;
+
+/// Where a step finds an input.
+#[derive(Clone, Copy, Debug)]
+pub enum Source {
+    /// A register; register 0 has the value at which the formula is evaluated.
+    Register(u8),
+    /// A constant or an evaluated slot.
+    Operand(Operand),
+}
+
+/// A step of a formula.
+#[derive(Clone, Copy, Debug)]
+#[allow(missing_docs)]
+pub enum Step {
+    /// Goes on at `to` if the slot is not evaluated: nothing asks for it.
+    SkipUnasked { slot: Slot, to: u16 },
+    /// Takes the value of the slot and goes on at `to`, if it is evaluated.
+    Recall { slot: Slot, into: u8, to: u16 },
+    /// A function of single numbers.
+    Unary { f: fn(f64) -> f64, x: Source, into: u8 },
+    /// See `Unary`.
+    Binary { f: fn(f64, f64) -> f64, x: Source, y: Source, into: u8 },
+    /// See `Unary`.
+    Test { f: fn(f64, f64) -> bool, x: Source, y: Source, into: u8 },
+    /// See `Unary`.
+    Logic { f: fn(bool) -> bool, x: Source, into: u8 },
+    /// An element of an array.
+    Index { base: Source, key: Source, into: u8 },
+    /// Goes on at `otherwise` if the condition of the selection in the slot does not hold.
+    Branch { slot: Slot, cond: Source, otherwise: u16 },
+    /// Goes on elsewhere.
+    Go { to: u16 },
+    /// Copies a value.
+    Copy { from: Source, into: u8 },
+    /// Scores the choice in the slot under other parameters.
+    Draw { slot: Slot, builtin: u32, parameters: [Source; PARAMETERS] },
+    /// Scores the observation in the slot.
+    Observe { slot: Slot, builtin: u32, parameters: [Source; PARAMETERS], value: Source },
+    /// Scores the factor in the slot.
+    Factor { slot: Slot, weight: Source },
+}
+
+/// The scores of a block as a function of the value of one slot.
+#[derive(Clone, Debug, Default)]
+pub struct Formula {
+    /// What is done.
+    pub steps: Box<[Step]>,
+    /// The computations that depend on the value; they must not be read from other blocks.
+    pub computations: Box<[Slot]>,
+    /// What the alternatives of its selections hold, and how often at most: who else holds it keeps it when a selection
+    /// takes the other alternative.
+    pub held: Box<[(Operand, u32)]>,
+    /// The computations of the alternatives; they must hold nothing besides their operands.
+    pub computed: Box<[Slot]>,
+}
+
+impl Formula {
+    /// The formula of a slot of a block, if there is one.
+    pub(super) fn new(ops: &[Op], slots: &[SlotFacts], from: Slot, builtins: &Table) -> Option<Formula> {
+        let dependents = super::spread::dependents(ops, slots, from)?;
+        let mut compiler = Compiler {
+            ops,
+            builtins,
+            from,
+            dependent: vec![false; ops.len()],
+            steps: Vec::new(),
+            known: vec![None; ops.len()],
+            registers: 1,
+            inside: false,
+            held: Vec::new(),
+            computed: Vec::new(),
+        };
+        dependents.iter().for_each(|s| compiler.dependent[*s as usize] = true);
+        let is_score = |s: &Slot| matches!(ops[*s as usize], Op::Draw { .. } | Op::Observe { .. } | Op::Factor { .. });
+        let (scores, computations): (Vec<Slot>, Vec<Slot>) = dependents.into_iter().partition(is_score);
+        scores.into_iter().try_for_each(|slot| compiler.score(slot))?;
+        let Compiler { steps, held, computed, .. } = compiler;
+        Some(Formula {
+            steps: steps.into(),
+            computations: computations.into(),
+            held: held.into(),
+            computed: computed.into(),
+        })
+    }
+}
+
+struct Compiler<'a> {
+    ops: &'a [Op],
+    builtins: &'a Table,
+    from: Slot,
+    /// By slot: whether it depends on the value.
+    dependent: Vec<bool>,
+    steps: Vec<Step>,
+    /// By slot: the register that has its value wherever the next step runs.
+    known: Vec<Option<u8>>,
+    registers: usize,
+    /// Whether the next step is inside an alternative: what it reads may not be evaluated.
+    inside: bool,
+    held: Vec<(Operand, u32)>,
+    computed: Vec<Slot>,
+}
+
+impl Compiler<'_> {
+    /// The steps that score a slot.
+    fn score(&mut self, slot: Slot) -> Option<()> {
+        let known = self.known.clone();
+        let skip = self.push(Step::SkipUnasked { slot, to: 0 })?;
+        let step = match &self.ops[slot as usize] {
+            Op::Draw { dist: DistSpec::Family { builtin, args }, keys, .. } => {
+                if keys.iter().any(|k| self.depends(*k)) {
+                    return None;
+                }
+                Step::Draw { slot, builtin: *builtin, parameters: self.parameters(args)? }
+            }
+            Op::Observe { dist: DistSpec::Family { builtin, args }, value, .. } => {
+                let (parameters, value) = (self.parameters(args)?, self.source(*value)?);
+                Step::Observe { slot, builtin: *builtin, parameters, value }
+            }
+            Op::Factor { weight, .. } => Step::Factor { slot, weight: self.source(*weight)? },
+            _ => return None,
+        };
+        self.push(step)?;
+        self.land(skip);
+        // What was computed for it was not if it was skipped.
+        self.known = known;
+        Some(())
+    }
+
+    fn parameters(&mut self, args: &[Operand]) -> Option<[Source; PARAMETERS]> {
+        if args.len() > PARAMETERS {
+            return None;
+        }
+        let mut all = [Source::Register(0); PARAMETERS];
+        for (to, o) in all.iter_mut().zip(args) {
+            *to = self.source(*o)?;
+        }
+        Some(all)
+    }
+
+    fn depends(&self, o: Operand) -> bool {
+        matches!(o, Operand::Local(s) if s == self.from || self.dependent[s as usize])
+    }
+
+    /// Where an operand's value will be.
+    fn source(&mut self, o: Operand) -> Option<Source> {
+        let Operand::Local(slot) = o else { return Some(Source::Operand(o)) };
+        if slot == self.from {
+            return Some(Source::Register(0));
+        }
+        if let Some(r) = self.known[slot as usize] {
+            return Some(Source::Register(r));
+        }
+        if self.dependent[slot as usize] {
+            let r = self.compute(slot)?;
+            self.known[slot as usize] = Some(r);
+            return Some(Source::Register(r));
+        }
+        if !self.inside || !self.is_computed(slot) {
+            return Some(Source::Operand(o));
+        }
+        let into = self.register()?;
+        let recall = self.push(Step::Recall { slot, into, to: 0 })?;
+        let known = self.known.clone();
+        let r = self.compute(slot)?;
+        self.push(Step::Copy { from: Source::Register(r), into })?;
+        self.known = known;
+        self.land(recall);
+        self.known[slot as usize] = Some(into);
+        Some(Source::Register(into))
+    }
+
+    fn is_computed(&self, slot: Slot) -> bool {
+        match &self.ops[slot as usize] {
+            Op::Prim { builtin, .. } => self.builtins.get(*builtin).scalar.is_some(),
+            Op::Index { keys, .. } => keys.len() == 1,
+            Op::Select { .. } => true,
+            _ => false,
+        }
+    }
+
+    /// The steps that compute a slot; the register of its value.
+    fn compute(&mut self, slot: Slot) -> Option<u8> {
+        match &self.ops[slot as usize] {
+            Op::Prim { builtin, args } => {
+                let mut arg = |i: usize| self.source(*args.get(i)?);
+                let (x, y) = (arg(0)?, arg(1));
+                let into = self.register()?;
+                let step = match (self.builtins.get(*builtin).scalar?, y) {
+                    (Scalar::Unary(f), _) => Step::Unary { f, x, into },
+                    (Scalar::Logic(f), _) => Step::Logic { f, x, into },
+                    (Scalar::Binary(f), Some(y)) => Step::Binary { f, x, y, into },
+                    (Scalar::Test(f), Some(y)) => Step::Test { f, x, y, into },
+                    _ => return None,
+                };
+                self.push(step)?;
+                Some(into)
+            }
+            Op::Index { base, keys } if keys.len() == 1 => {
+                let (base, key) = (self.source(*base)?, self.source(keys[0])?);
+                let into = self.register()?;
+                self.push(Step::Index { base, key, into })?;
+                Some(into)
+            }
+            Op::Select { cond, then, otherwise } => {
+                let (cond, then, otherwise) = (*cond, *then, *otherwise);
+                let chosen = self.depends(cond);
+                let cond = self.source(cond)?;
+                let into = self.register()?;
+                let branch = self.push(Step::Branch { slot, cond, otherwise: 0 })?;
+                self.alternative(then, into)?;
+                let go = self.push(Step::Go { to: 0 })?;
+                self.land(branch);
+                self.alternative(otherwise, into)?;
+                self.land(go);
+                if chosen {
+                    self.hold(then)?;
+                    self.hold(otherwise)?;
+                }
+                Some(into)
+            }
+            _ => None,
+        }
+    }
+
+    fn alternative(&mut self, o: Operand, into: u8) -> Option<()> {
+        let (known, inside) = (self.known.clone(), std::mem::replace(&mut self.inside, true));
+        let from = self.source(o)?;
+        self.push(Step::Copy { from, into })?;
+        (self.known, self.inside) = (known, inside);
+        Some(())
+    }
+
+    /// Notes what an alternative holds.
+    fn hold(&mut self, o: Operand) -> Option<()> {
+        let inner = match o {
+            Operand::Const(_) => return Some(()),
+            Operand::Local(s) => self.computation(s),
+            Operand::Outer { .. } => None,
+        };
+        let Some((slot, inner)) = inner else {
+            match self.held.iter_mut().find(|(other, _)| *other == o) {
+                Some((_, times)) => *times += 1,
+                None => self.held.push((o, 1)),
+            }
+            return Some(());
+        };
+        self.computed.push(slot);
+        if self.computed.len() > LONGEST {
+            return None;
+        }
+        inner.into_iter().try_for_each(|o| self.hold(o))
+    }
+
+    /// A slot that only computes, and its operands.
+    fn computation(&self, slot: Slot) -> Option<(Slot, Vec<Operand>)> {
+        let op = &self.ops[slot as usize];
+        let mut operands = Vec::new();
+        match op {
+            Op::Prim { .. } | Op::Array(_) | Op::Record { .. } | Op::Index { .. } => {}
+            Op::Select { then, otherwise, .. } => operands.extend([*then, *otherwise]),
+            _ => return None,
+        }
+        op.operands(|o| operands.push(o));
+        (slot != self.from).then_some((slot, operands))
+    }
+
+    fn register(&mut self) -> Option<u8> {
+        self.registers += 1;
+        (self.registers <= REGISTERS).then(|| self.registers as u8 - 1)
+    }
+
+    fn push(&mut self, step: Step) -> Option<usize> {
+        self.steps.push(step);
+        (self.steps.len() <= LONGEST).then(|| self.steps.len() - 1)
+    }
+
+    /// Lets the jump at a step lead to the next one.
+    fn land(&mut self, jump: usize) {
+        let here = self.steps.len() as u16;
+        if let Step::SkipUnasked { to, .. }
+        | Step::Recall { to, .. }
+        | Step::Go { to }
+        | Step::Branch { otherwise: to, .. } = &mut self.steps[jump]
+        {
+            *to = here;
+        }
+    }
+}
