@@ -15,19 +15,42 @@ impl Categorical {
     /// With these weights; fails unless all are finite and not negative, and their sum is positive and finite.
     pub fn new(weights: impl Into<Arc<[f64]>>) -> Result<Categorical, ParamError> {
         let weights = weights.into();
-        if let Some(w) = weights.iter().find(|w| !(w.is_finite() && **w >= 0.0)) {
-            return Err(ParamError::new(Self::NAME, "weights", w, "must be finite and not negative"));
-        }
-        let total: f64 = weights.iter().sum();
-        if !(total > 0.0 && total.is_finite()) {
-            return Err(ParamError::new(Self::NAME, "weights", total, "must have a positive, finite sum"));
-        }
+        let total = total(&weights)?;
         Ok(Categorical { weights, total })
+    }
+
+    /// The log probability of a number under weights that are only borrowed.
+    pub(crate) fn log_probability(weights: &[f64], x: f64) -> Result<f64, ParamError> {
+        total(weights).map(|total| log_probability(weights, total, x))
     }
 
     /// The probability of index `i`.
     pub fn probability(&self, i: usize) -> f64 {
         self.weights.get(i).map_or(0.0, |w| w / self.total)
+    }
+}
+
+/// The sum of valid weights.
+fn total(weights: &[f64]) -> Result<f64, ParamError> {
+    if let Some(w) = weights.iter().find(|w| !(w.is_finite() && **w >= 0.0)) {
+        return Err(ParamError::new(Categorical::NAME, "weights", w, "must be finite and not negative"));
+    }
+    let total: f64 = weights.iter().sum();
+    if !(total > 0.0 && total.is_finite()) {
+        return Err(ParamError::new(Categorical::NAME, "weights", total, "must have a positive, finite sum"));
+    }
+    Ok(total)
+}
+
+#[inline]
+fn log_probability(weights: &[f64], total: f64, x: f64) -> f64 {
+    if !(x >= 0.0 && x == libm::trunc(x)) {
+        return f64::NEG_INFINITY;
+    }
+    match weights.get(x as usize) {
+        Some(w) if *w > 0.0 && total == 1.0 => libm::log(*w),
+        Some(w) if *w > 0.0 => libm::log(*w) - libm::log(total),
+        _ => f64::NEG_INFINITY,
     }
 }
 
@@ -53,14 +76,7 @@ impl Scalar for Categorical {
 
     #[inline]
     fn log_density_num(&self, x: f64) -> f64 {
-        if !(x >= 0.0 && x == libm::trunc(x)) {
-            return f64::NEG_INFINITY;
-        }
-        match self.weights.get(x as usize) {
-            Some(w) if *w > 0.0 && self.total == 1.0 => libm::log(*w),
-            Some(w) if *w > 0.0 => libm::log(*w) - libm::log(self.total),
-            _ => f64::NEG_INFINITY,
-        }
+        log_probability(&self.weights, self.total, x)
     }
 
     fn slope(&self, x: f64) -> Slope {

@@ -9,7 +9,7 @@ use super::builtins::{Scalar, Table};
 use super::code::{DistSpec, Op, Operand, Slot, SlotFacts};
 
 /// The most registers of a formula.
-pub const REGISTERS: usize = 24;
+pub const REGISTERS: usize = 16;
 
 /// The most parameters of a distribution in a formula.
 pub const PARAMETERS: usize = 4;
@@ -65,6 +65,8 @@ pub struct Formula {
     pub steps: Box<[Step]>,
     /// The computations that depend on the value; they must not be read from other blocks.
     pub computations: Box<[Slot]>,
+    /// In which registers they are left, if they are computed.
+    pub results: Box<[(Slot, u8)]>,
     /// What the alternatives of its selections hold, and how often at most: who else holds it keeps it when a selection
     /// takes the other alternative.
     pub held: Box<[(Operand, u32)]>,
@@ -85,6 +87,7 @@ impl Formula {
             known: vec![None; ops.len()],
             registers: 1,
             inside: false,
+            results: Vec::new(),
             held: Vec::new(),
             computed: Vec::new(),
         };
@@ -92,10 +95,11 @@ impl Formula {
         let is_score = |s: &Slot| matches!(ops[*s as usize], Op::Draw { .. } | Op::Observe { .. } | Op::Factor { .. });
         let (scores, computations): (Vec<Slot>, Vec<Slot>) = dependents.into_iter().partition(is_score);
         scores.into_iter().try_for_each(|slot| compiler.score(slot))?;
-        let Compiler { steps, held, computed, .. } = compiler;
+        let Compiler { steps, results, held, computed, .. } = compiler;
         Some(Formula {
             steps: steps.into(),
             computations: computations.into(),
+            results: results.into(),
             held: held.into(),
             computed: computed.into(),
         })
@@ -114,6 +118,7 @@ struct Compiler<'a> {
     registers: usize,
     /// Whether the next step is inside an alternative: what it reads may not be evaluated.
     inside: bool,
+    results: Vec<(Slot, u8)>,
     held: Vec<(Operand, u32)>,
     computed: Vec<Slot>,
 }
@@ -171,6 +176,7 @@ impl Compiler<'_> {
         if self.dependent[slot as usize] {
             let r = self.compute(slot)?;
             self.known[slot as usize] = Some(r);
+            self.results.push((slot, r));
             return Some(Source::Register(r));
         }
         if !self.inside || !self.is_computed(slot) {

@@ -25,17 +25,28 @@ pub struct ExactSum {
 /// Limbs for exponents up to 1024.
 const LIMBS: usize = 26;
 
+/// x 2^64 towards zero, for |x| < 2^40: `(x * SCALE) as i128` in three pieces that are machine words, each exact.
+#[inline]
+fn quantised(x: f64) -> i128 {
+    const HALF: f64 = 4_294_967_296.0; // 2^32
+    let whole = x as i64;
+    let rest = (x - whole as f64) * HALF;
+    let upper = rest as i64;
+    let lower = ((rest - upper as f64) * HALF) as i64;
+    (i128::from(whole) << 64) + i128::from((upper << 32) + lower)
+}
+
 impl ExactSum {
     /// Adds a term.
     #[inline]
     pub fn add(&mut self, x: f64) {
-        if x.abs() < LARGE { self.fine += (x * SCALE) as i128 } else { self.put(x, 1) }
+        if x.abs() < LARGE { self.fine += quantised(x) } else { self.put(x, 1) }
     }
 
     /// Takes a term out again: the exact inverse of [`ExactSum::add`].
     #[inline]
     pub fn sub(&mut self, x: f64) {
-        if x.abs() < LARGE { self.fine -= (x * SCALE) as i128 } else { self.put(x, -1) }
+        if x.abs() < LARGE { self.fine -= quantised(x) } else { self.put(x, -1) }
     }
 
     /// Whether all terms were finite and small.
@@ -58,6 +69,21 @@ impl ExactSum {
             sum
         };
         ExactSum::difference(&total(new), &total(old))
+    }
+
+    /// [`ExactSum::difference`] to an empty sum.
+    pub fn above_nothing(&self) -> f64 {
+        if self.is_fine() { self.fine as f64 / SCALE } else { ExactSum::difference(self, &ExactSum::default()) }
+    }
+
+    /// [`ExactSum::above_nothing`] of two sums together.
+    pub fn of_both(a: &ExactSum, b: &ExactSum) -> f64 {
+        if a.is_fine() && b.is_fine() {
+            return (a.fine + b.fine) as f64 / SCALE;
+        }
+        let mut sum = a.clone();
+        sum.merge(b);
+        sum.above_nothing()
     }
 
     fn put(&mut self, x: f64, sign: i64) {
@@ -196,6 +222,15 @@ mod tests {
         fn sums_are_right(xs in prop::collection::vec(-1e6..1e6f64, 0..100)) {
             let naive: f64 = xs.iter().sum();
             prop_assert!((sum(&xs).value() - naive).abs() <= 1e-9 * (1.0 + xs.iter().map(|x| x.abs()).sum::<f64>()));
+        }
+    }
+
+    #[test]
+    fn terms_are_quantised_towards_zero() {
+        let mut xs = vec![0.0, -0.0, 1.0, -1.0, 0.5, 1e-300, -1e-19, 6e-20, LARGE.next_down(), -LARGE.next_down()];
+        xs.extend((0..2000).map(|i| libm::sin(f64::from(i)) * libm::exp2(f64::from(i % 120 - 80))));
+        for x in xs {
+            assert_eq!(quantised(x), (x * SCALE) as i128, "{x}");
         }
     }
 

@@ -207,6 +207,9 @@ impl Graph {
     /// The distribution of a choice under the current values of its parameters.
     pub fn dist_of(&self, code: &Code, n: NodeId) -> Option<Dist> {
         let Op::Draw { dist, .. } = self.op(code, n) else { return None };
+        if let Some(simple) = self.simple_dist(code, n) {
+            return Some(simple);
+        }
         let frame = self.nodes[n as usize].frame;
         self.make_dist(code, n, frame, dist, &mut Deps::new()).ok()
     }

@@ -7,16 +7,26 @@ use super::graph::Graph;
 use super::node::*;
 use super::propose::Weight;
 use crate::dist::{Datum, Dist};
-use crate::lang::builtins::{Args, Kind};
-use crate::lang::code::{Code, Op, Operand, Slot};
+use crate::lang::builtins::{Args, Builtin, Kind, Scalar};
+use crate::lang::code::{Code, DistSpec, Op, Operand, Slot};
 use crate::lang::formula::{Formula, PARAMETERS, REGISTERS, Source, Step};
 use crate::lang::index::place;
 use crate::lang::value::Value;
 use crate::num::ExactSum;
 use smallvec::SmallVec;
 
-/// The formulas that tell what another value of a choice does: the first node of the frame of each, with the formula.
-pub(crate) type Formulas<'c> = SmallVec<[(NodeId, &'c Formula); 4]>;
+/// The formulas that tell what another value of a choice does.
+pub(crate) type Formulas<'c> = SmallVec<[Placed<'c>; 4]>;
+
+/// A formula in a frame.
+#[derive(Clone, Copy)]
+pub(crate) struct Placed<'c> {
+    /// The first node of the frame.
+    base: NodeId,
+    /// The node that has the value: the choice, or an element of a container that is the choice.
+    entry: NodeId,
+    formula: &'c Formula,
+}
 
 /// The most other frames that may read the choice.
 const READERS: usize = 4;
@@ -30,11 +40,19 @@ enum Register<'a> {
 }
 
 /// A formula at work on the nodes of one frame.
-struct Evaluation<'a> {
+struct Evaluation<'a, const N: usize> {
     graph: &'a Graph,
     code: &'a Code,
     base: NodeId,
-    registers: [Register<'a>; REGISTERS],
+    registers: [Register<'a>; N],
+    /// A bit for each register that was filled.
+    filled: u32,
+    /// Whether a selection took its other alternative.
+    chose: bool,
+    /// The scores, by node.
+    scores: SmallVec<[(NodeId, f64); 4]>,
+    prior: ExactSum,
+    likelihood: ExactSum,
 }
 
 impl Graph {
@@ -42,11 +60,11 @@ impl Graph {
     pub fn formulas<'c>(&self, code: &'c Code, target: NodeId) -> Option<Formulas<'c>> {
         let facts = self.slot_facts(code, target);
         let finite = self.prior.is_fine() && self.likelihood.is_fine();
-        if !self.incremental || !finite || !self.is_plain_choice(target) {
+        if !self.incremental || !finite || self.watched.is_some() || !self.is_plain_choice(target) {
             return None;
         }
         let mut all = Formulas::new();
-        self.add_formula(target - facts.slot, facts.formula.as_deref()?, &mut all)?;
+        self.add_formula(target, target - facts.slot, facts.formula.as_deref()?, &mut all)?;
         let readers = &self.outside[self.nodes[target as usize].outside as usize].users;
         if readers.len() > READERS {
             return None;
@@ -66,25 +84,21 @@ impl Graph {
             if self.is_read_outside(*m) {
                 return None;
             }
-            self.add_formula(m - facts.slot, facts.formula.as_deref()?, &mut all)?;
+            self.add_formula(*m, m - facts.slot, facts.formula.as_deref()?, &mut all)?;
         }
         Some(all)
     }
 
     /// Adds a formula, if it sees all that depends on its value.
-    fn add_formula<'c>(&self, base: NodeId, formula: &'c Formula, all: &mut Formulas<'c>) -> Option<()> {
-        let moves = |m: NodeId| !matches!(self.nodes[m as usize].state, State::Empty) && self.is_read_outside(m);
-        if formula.computations.iter().any(|slot| moves(base + slot)) {
+    fn add_formula<'c>(&self, entry: NodeId, base: NodeId, formula: &'c Formula, all: &mut Formulas<'c>) -> Option<()> {
+        if formula.computations.iter().any(|slot| self.is_read_outside(base + slot)) {
             return None;
-        }
-        if formula.steps.is_empty() {
-            return Some(());
         }
         // Two in one frame could move the same score.
-        if all.iter().any(|(other, _)| *other == base) {
+        if !formula.steps.is_empty() && all.iter().any(|p| p.base == base && !p.formula.steps.is_empty()) {
             return None;
         }
-        all.push((base, formula));
+        all.push(Placed { base, entry, formula });
         Some(())
     }
 
@@ -97,33 +111,75 @@ impl Graph {
         dist: &Dist,
         value: &Datum,
     ) -> Option<Weight> {
-        let (mut prior, mut likelihood) = (ExactSum::default(), ExactSum::default());
-        prior.sub(self.nodes[target as usize].score);
-        prior.add(dist.log_density_stored(value));
-        let at = match value {
-            Datum::Num(x) => Register::Num(*x),
-            Datum::Bool(b) => Register::Bool(*b),
-            _ => return None,
-        };
-        let single = formulas.len() == 1;
-        for (base, formula) in formulas {
-            let registers = [at; REGISTERS];
-            let mut e = Evaluation { graph: self, code, base: *base, registers };
-            e.run(formula, single, &mut prior, &mut likelihood)?;
+        let mut e = Evaluation::new(self, code, [Register::of_datum(value)?; REGISTERS]);
+        e.prior.sub(self.nodes[target as usize].score);
+        e.prior.add(dist.log_density_stored(value));
+        formulas.iter().try_for_each(|placed| e.run(placed, formulas.len() == 1))?;
+        Some(Weight::beside(&e.prior, &e.likelihood))
+    }
+
+    /// Gives the choice another value for good, where formulas cover all that follows and nothing is held or let go; false,
+    /// and nothing is done, otherwise.
+    pub fn assign(&mut self, code: &Code, target: NodeId, dist: &Dist, value: &Datum) -> bool {
+        let Some(formulas) = self.formulas(code, target) else { return false };
+        let Some(at) = Register::of_datum(value) else { return false };
+        let mut values: SmallVec<[(NodeId, Value); 4]> = SmallVec::new();
+        let mut e = Evaluation::new(self, code, [at; REGISTERS]);
+        for placed in &formulas {
+            if e.run(placed, formulas.len() == 1).is_none() || e.chose {
+                return false;
+            }
+            values.push((placed.entry, at.to_value()));
+            for slot in &placed.formula.computations {
+                if e.node(*slot).state == State::Clean {
+                    let mut results = placed.formula.results.iter();
+                    let Some((_, r)) = results.find(|(s, r)| s == slot && e.filled & (1 << r) != 0) else {
+                        return false;
+                    };
+                    values.push((placed.base + slot, e.registers[*r as usize].to_value()));
+                }
+            }
         }
-        Some(Weight::beside(&prior, &likelihood))
+        let Evaluation { scores, prior, likelihood, .. } = e;
+        if scores.iter().any(|(n, _)| matches!(self.nodes[*n as usize].side.as_deref(), Some(Side::Total(_)))) {
+            return false;
+        }
+        let score = dist.log_density_stored(value);
+        self.prior.sub(self.nodes[target as usize].score);
+        self.prior.add(score);
+        self.prior.merge(&prior);
+        self.likelihood.merge(&likelihood);
+        self.nodes[target as usize].score = score;
+        for (n, value) in values {
+            self.nodes[n as usize].value = value;
+        }
+        for (n, score) in scores {
+            self.nodes[n as usize].score = score;
+        }
+        true
     }
 }
 
-impl<'a> Evaluation<'a> {
+impl Graph {
+    /// The distribution of a choice whose parameters are single numbers, or arrays as they are.
+    pub fn simple_dist(&self, code: &Code, n: NodeId) -> Option<Dist> {
+        let Op::Draw { dist: DistSpec::Family { builtin, args }, .. } = self.op(code, n) else { return None };
+        let mut read = [Register::Num(0.0); PARAMETERS];
+        let read = read.get_mut(..args.len())?;
+        let mut e = Evaluation::new(self, code, []);
+        e.base = n - self.slot_facts(code, n).slot;
+        for (to, o) in read.iter_mut().zip(args) {
+            *to = e.read(Source::Operand(*o))?;
+        }
+        family(code.builtins.get(*builtin), read)
+    }
+}
+
+impl<'a> Evaluation<'a, REGISTERS> {
     /// Runs a formula. `may_choose`: selections may take their other alternative.
-    fn run(
-        &mut self,
-        formula: &Formula,
-        may_choose: bool,
-        prior: &mut ExactSum,
-        likelihood: &mut ExactSum,
-    ) -> Option<()> {
+    fn run(&mut self, placed: &Placed, may_choose: bool) -> Option<()> {
+        let formula = placed.formula;
+        (self.base, self.filled) = (placed.base, 1);
         let mut next = 0;
         while let Some(step) = formula.steps.get(next) {
             next += 1;
@@ -136,71 +192,68 @@ impl<'a> Evaluation<'a> {
                 Step::Recall { slot, into, to } => {
                     let node = self.node(slot);
                     if node.state == State::Clean {
-                        self.registers[into as usize] = Register::of(&node.value);
+                        self.fill(into, Register::of(&node.value));
                         next = to as usize;
                     }
                 }
-                Step::Unary { f, x, into } => self.registers[into as usize] = Register::Num(f(self.number(x)?)),
+                Step::Unary { f, x, into } => self.fill(into, Register::Num(f(self.number(x)?))),
                 Step::Binary { f, x, y, into } => {
-                    self.registers[into as usize] = Register::Num(f(self.number(x)?, self.number(y)?));
+                    self.fill(into, Register::Num(f(self.number(x)?, self.number(y)?)));
                 }
                 Step::Test { f, x, y, into } => {
-                    self.registers[into as usize] = Register::Bool(f(self.number(x)?, self.number(y)?));
+                    self.fill(into, Register::Bool(f(self.number(x)?, self.number(y)?)));
                 }
-                Step::Logic { f, x, into } => self.registers[into as usize] = Register::Bool(f(self.truth(x)?)),
+                Step::Logic { f, x, into } => self.fill(into, Register::Bool(f(self.truth(x)?))),
                 Step::Index { base, key, into } => {
-                    self.registers[into as usize] = element(self.read(base)?, self.number(key)?)?;
+                    self.fill(into, element(self.read(base)?, self.number(key)?)?);
                 }
                 Step::Branch { slot, cond, otherwise } => {
                     let holds = self.truth(cond)?;
                     let node = self.node(slot);
                     let other = node.state == State::Clean && holds != (node.flags & OTHERWISE == 0);
-                    if other && !(may_choose && self.can_choose(formula)) {
+                    if other && !self.chose && !(may_choose && self.can_choose(formula)) {
                         return None;
                     }
+                    self.chose |= other;
                     if !holds {
                         next = otherwise as usize;
                     }
                 }
                 Step::Go { to } => next = to as usize,
-                Step::Copy { from, into } => self.registers[into as usize] = self.read(from)?,
+                Step::Copy { from, into } => self.fill(into, self.read(from)?),
                 Step::Draw { slot, builtin, ref parameters } => {
-                    let n = self.base + slot;
-                    let dist = self.dist(builtin, parameters)?;
-                    let value = match (self.graph.is_plain_choice(n), &self.node(slot).value) {
-                        (true, Value::Num(x)) => Datum::Num(*x),
-                        (true, Value::Bool(b)) => Datum::Bool(*b),
-                        _ => return None,
-                    };
-                    if dist.elements().is_some() || !dist.stored_support().fits(&value) {
+                    if !self.graph.is_plain_choice(self.base + slot) {
                         return None;
                     }
-                    prior.sub(self.node(slot).score);
-                    prior.add(dist.log_density(&value));
+                    let score = self.log_density(builtin, parameters, Register::of(&self.node(slot).value))?;
+                    self.prior.sub(self.node(slot).score);
+                    self.prior.add(score);
+                    self.scores.push((self.base + slot, score));
                 }
                 Step::Observe { slot, builtin, ref parameters, value } => {
                     let n = self.base + slot;
-                    let dist = self.dist(builtin, parameters)?;
                     let replaced = self.graph.replaced(self.code, n).map(Register::of);
                     let value = replaced.map_or_else(|| self.read(value), Some)?;
-                    if dist.elements().is_some() {
-                        return None;
-                    }
-                    self.graph.take_score(n, likelihood);
-                    likelihood.add(match value {
-                        Register::Num(x) if !x.is_nan() => dist.log_density_num(x),
-                        Register::Bool(b) => dist.log_density_bool(b),
-                        _ => return None,
-                    });
+                    let score = self.log_density(builtin, parameters, value)?;
+                    self.graph.take_score(n, &mut self.likelihood);
+                    self.likelihood.add(score);
+                    self.scores.push((n, score));
                 }
                 Step::Factor { slot, weight } => {
                     let weight = self.number(weight).filter(|w| !w.is_nan())?;
-                    likelihood.sub(self.node(slot).score);
-                    likelihood.add(weight);
+                    self.likelihood.sub(self.node(slot).score);
+                    self.likelihood.add(weight);
+                    self.scores.push((self.base + slot, weight));
                 }
             }
         }
         Some(())
+    }
+
+    #[inline(always)]
+    fn fill(&mut self, into: u8, value: Register<'a>) {
+        self.registers[into as usize] = value;
+        self.filled |= 1 << into;
     }
 
     /// Whether its selections can take their other alternatives without letting anything go but computations.
@@ -214,29 +267,51 @@ impl<'a> Evaluation<'a> {
         formula.computed.iter().all(|slot| self.node(*slot).side.is_none()) && formula.held.iter().all(is_held)
     }
 
-    /// A distribution with these parameters.
-    #[inline]
-    fn dist(&self, builtin: u32, parameters: &[Source; PARAMETERS]) -> Option<Dist> {
-        let builtin = self.code.builtins.get(builtin);
-        let Kind::Distribution(make) = builtin.kind else { return None };
-        let count = builtin.args.len().min(PARAMETERS);
-        let mut numbers: [Value; PARAMETERS] = Default::default();
+    /// The log density of a single number or truth value.
+    fn log_density(&self, builtin: u32, parameters: &[Source; PARAMETERS], x: Register) -> Option<f64> {
         let mut read = [Register::Num(0.0); PARAMETERS];
-        for i in 0..count {
-            read[i] = self.read(parameters[i])?;
-            match read[i] {
-                Register::Num(x) => numbers[i] = Value::Num(x),
-                Register::Bool(b) => numbers[i] = Value::Bool(b),
-                Register::Other(_) => {}
+        let builtin = self.code.builtins.get(builtin);
+        let read = read.get_mut(..builtin.args.len())?;
+        for (to, from) in read.iter_mut().zip(parameters) {
+            *to = self.read(*from)?;
+        }
+        match (builtin.scalar, &*read, x) {
+            (_, _, Register::Num(x)) if x.is_nan() => None,
+            (Some(Scalar::Weights { log_probability, .. }), [Register::Other(Value::Array(w))], Register::Num(x)) => {
+                log_probability(w, x)
+            }
+            (Some(Scalar::Family { log_density, .. }), _, Register::Num(x)) => {
+                log_density(numbers(read, &mut [0.0; PARAMETERS])?, x)
+            }
+            _ => {
+                let dist = family(builtin, read)?;
+                match x {
+                    _ if !dist.is_scalar() => None,
+                    Register::Num(x) => Some(dist.log_density_num(x)),
+                    Register::Bool(b) => Some(dist.log_density_bool(b)),
+                    Register::Other(_) => None,
+                }
             }
         }
-        let values: [&Value; PARAMETERS] = std::array::from_fn(|i| match read[i] {
-            Register::Other(v) => v,
-            _ => &numbers[i],
-        });
-        make(&Args { builtin, values: &values[..count] }).ok()
+    }
+}
+
+impl<'a, const N: usize> Evaluation<'a, N> {
+    fn new(graph: &'a Graph, code: &'a Code, registers: [Register<'a>; N]) -> Self {
+        Evaluation {
+            graph,
+            code,
+            base: 0,
+            registers,
+            filled: 0,
+            chose: false,
+            scores: SmallVec::new(),
+            prior: ExactSum::default(),
+            likelihood: ExactSum::default(),
+        }
     }
 
+    #[inline(always)]
     fn node(&self, slot: Slot) -> &'a Node {
         &self.graph.nodes[(self.base + slot) as usize]
     }
@@ -245,7 +320,7 @@ impl<'a> Evaluation<'a> {
         self.graph.nodes[self.base as usize].frame
     }
 
-    #[inline]
+    #[inline(always)]
     fn read(&self, s: Source) -> Option<Register<'a>> {
         let node = match s {
             Source::Register(r) => return Some(self.registers[r as usize]),
@@ -256,6 +331,7 @@ impl<'a> Evaluation<'a> {
         (node.state == State::Clean).then(|| Register::of(&node.value))
     }
 
+    #[inline(always)]
     fn number(&self, s: Source) -> Option<f64> {
         match self.read(s)? {
             Register::Num(x) => Some(x),
@@ -272,6 +348,22 @@ impl<'a> Evaluation<'a> {
 }
 
 impl<'a> Register<'a> {
+    fn of_datum(x: &Datum) -> Option<Self> {
+        match x {
+            Datum::Num(x) => Some(Register::Num(*x)),
+            Datum::Bool(b) => Some(Register::Bool(*b)),
+            _ => None,
+        }
+    }
+
+    fn to_value(self) -> Value {
+        match self {
+            Register::Num(x) => Value::Num(x),
+            Register::Bool(b) => Value::Bool(b),
+            Register::Other(v) => v.clone(),
+        }
+    }
+
     fn of(v: &'a Value) -> Self {
         match v {
             Value::Num(x) => Register::Num(*x),
@@ -279,6 +371,31 @@ impl<'a> Register<'a> {
             v => Register::Other(v),
         }
     }
+}
+
+/// Parameters that are all numbers.
+#[inline]
+fn numbers<'s>(parameters: &[Register], space: &'s mut [f64; PARAMETERS]) -> Option<&'s [f64]> {
+    let numbers = space.get_mut(..parameters.len())?;
+    for (to, from) in numbers.iter_mut().zip(parameters) {
+        let Register::Num(x) = from else { return None };
+        *to = *x;
+    }
+    Some(numbers)
+}
+
+/// The distribution with these parameters.
+fn family(builtin: &Builtin, parameters: &[Register]) -> Option<Dist> {
+    if let Some(Scalar::Family { make, .. }) = builtin.scalar {
+        return make(numbers(parameters, &mut [0.0; PARAMETERS])?);
+    }
+    if let (Some(Scalar::Weights { make, .. }), [Register::Other(Value::Array(w))]) = (builtin.scalar, parameters) {
+        return make(w);
+    }
+    let Kind::Distribution(make) = builtin.kind else { return None };
+    let owned: SmallVec<[Value; PARAMETERS]> = parameters.iter().map(|r| r.to_value()).collect();
+    let values: SmallVec<[&Value; PARAMETERS]> = owned.iter().collect();
+    make(&Args { builtin, values: &values }).ok()
 }
 
 /// An element of an array that is there.
@@ -290,3 +407,7 @@ fn element(base: Register, key: f64) -> Option<Register> {
         _ => None,
     }
 }
+
+#[cfg(test)]
+#[path = "formula_tests.rs"]
+mod tests;

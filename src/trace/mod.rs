@@ -205,6 +205,12 @@ impl Trace {
         Ok(true)
     }
 
+    /// Gives a choice with this distribution another value for good, where that changes no structure and can be done in short;
+    /// false, and nothing is done, otherwise: then an update does it.
+    pub(crate) fn assign(&mut self, target: Target, dist: &Dist, value: &Datum) -> bool {
+        self.update.is_none() && target.element == NONE && self.graph.assign(&self.code, target.node, dist, value)
+    }
+
     /// Draws the targets anew from the prior, together.
     ///
     /// # Errors

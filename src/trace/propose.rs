@@ -78,10 +78,8 @@ pub struct Weight {
 impl Weight {
     /// What an update would do that changes these sums by these terms, and no structure.
     pub(crate) fn beside(prior: &ExactSum, likelihood: &ExactSum) -> Self {
-        let none = ExactSum::default();
-        let log_joint = ExactSum::balance([prior, likelihood, &none], [&none, &none, &none]);
-        let log_likelihood = ExactSum::difference(likelihood, &none);
-        Weight { log_weight: log_joint, log_joint, log_likelihood, ..Weight::default() }
+        let log_joint = ExactSum::of_both(prior, likelihood);
+        Weight { log_weight: log_joint, log_joint, log_likelihood: likelihood.above_nothing(), ..Weight::default() }
     }
 }
 

@@ -10,6 +10,7 @@ use crate::infer::kernel::{At, Kernel, Outcome, Registered, Scope, accepts, reco
 use crate::num::log_sum_exp;
 use crate::rng::Stream;
 use crate::trace::{Change, Peek, Target, Trace, TraceResult};
+use smallvec::SmallVec;
 
 /// `gibbs(sel)`: draws one choice from its distribution given all else.
 #[derive(Clone, Debug)]
@@ -112,6 +113,10 @@ impl Kernel for Gibbs {
             trace.rollback();
             return Ok(outcome);
         }
+        if !forward.structural && trace.assign(target, &dist, &self.values[chosen]) {
+            outcome.accepted = 1;
+            return Ok(outcome);
+        }
         if forward.pending != Some(chosen) {
             let change = [(target, Change::Set(self.values[chosen].clone()))];
             // The same lane: the same draws as when it was weighed.
@@ -143,20 +148,18 @@ impl Kernel for Gibbs {
     }
 }
 
-/// An index with probability proportional to exp(log[i]).
+/// An index with probability proportional to exp(log[i]), of which at least one is not zero.
 fn sample_log(log: &[f64], rng: &mut Stream) -> usize {
-    let total = log_sum_exp(log);
-    let mut u = rng.uniform();
+    let max = log.iter().copied().fold(f64::NEG_INFINITY, f64::max);
+    let weights: SmallVec<[f64; 16]> = log.iter().map(|l| if *l == max { 1.0 } else { libm::exp(l - max) }).collect();
+    let mut u = rng.uniform() * weights.iter().sum::<f64>();
     let mut last = 0;
-    for (i, l) in log.iter().enumerate() {
-        let p = libm::exp(l - total);
-        if p > 0.0 {
-            last = i;
-            if u < p {
-                return i;
-            }
-            u -= p;
+    for (i, p) in weights.iter().enumerate().filter(|(_, p)| **p > 0.0) {
+        last = i;
+        if u < *p {
+            break;
         }
+        u -= p;
     }
     last
 }

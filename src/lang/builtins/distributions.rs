@@ -6,7 +6,7 @@
 use super::covariance::CovarianceValue;
 use super::elementwise::array_len;
 use super::matrix::Matrix;
-use super::{Arg, Args, Builtin, Kind, Type, arg, opt};
+use super::{Arg, Args, Builtin, Kind, Scalar, Type, arg, opt};
 use crate::dist::{self, Dist, FAMILIES, Family, ParamError};
 use crate::lang::error::Fault;
 use crate::lang::value::Value;
@@ -22,6 +22,16 @@ macro_rules! scalar {
             &const { params::<{ [$(stringify!($p)),+].len() }>($name) },
             |a| elementwise(a, &[], |[$($p),+]| $made),
         )
+        .scalar(Scalar::Family {
+            make: |parameters| match *parameters {
+                [$($p),+] => $made.ok(),
+                _ => None,
+            },
+            log_density: |parameters, x| match *parameters {
+                [$($p),+] => $made.ok().map(|d| d.log_density_num(x)),
+                _ => None,
+            },
+        })
     };
 }
 
@@ -77,7 +87,11 @@ pub(super) const TABLE: &[Builtin] = &[
         "categorical",
         &[arg("weights", Type::Array, "One weight for each of 0, 1, …; they need not sum to 1.")],
         |a| dist::Categorical::new(a.array(0)?).map(Dist::Categorical).map_err(fault),
-    ),
+    )
+    .scalar(Scalar::Weights {
+        make: |weights| dist::Categorical::new(Arc::clone(weights)).map(Dist::Categorical).ok(),
+        log_probability: |weights, x| dist::Categorical::log_probability(weights, x).ok(),
+    }),
     other("dirichlet", &[arg("alpha", Type::Array, "One positive concentration for each share.")], |a| {
         dist::Dirichlet::new(&a.array(0)?).map(|d| Dist::Dirichlet(Arc::new(d))).map_err(fault)
     }),

@@ -31,6 +31,7 @@ use super::value::Value;
 use crate::dist::Dist;
 use smallvec::SmallVec;
 use std::fmt;
+use std::sync::Arc;
 
 /// The type of an argument or result, as far as it can be told before a run.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
@@ -146,7 +147,7 @@ pub enum Kind {
     Inference,
 }
 
-/// What a function is on single numbers, where that is all there is to it: what formulas of scores run, and what functions
+/// What a built-in is on single numbers, where that is all there is to it: what formulas of scores run, and what functions
 /// of arrays do with each element.
 #[derive(Clone, Copy)]
 pub enum Scalar {
@@ -158,6 +159,20 @@ pub enum Scalar {
     Test(fn(f64, f64) -> bool),
     /// A truth value of a truth value.
     Logic(fn(bool) -> bool),
+    /// A distribution by its parameters.
+    Family {
+        /// The distribution, if there is one.
+        make: fn(&[f64]) -> Option<Dist>,
+        /// The log density of a number, without keeping it.
+        log_density: fn(&[f64], f64) -> Option<f64>,
+    },
+    /// A distribution over 0, 1, … by an array of weights.
+    Weights {
+        /// The distribution, if there is one.
+        make: fn(&Arc<[f64]>) -> Option<Dist>,
+        /// The log probability of a number, without making it.
+        log_probability: fn(&[f64], f64) -> Option<f64>,
+    },
 }
 
 /// One built-in.

@@ -1,7 +1,10 @@
 //! The table itself: look-up, matching of arguments, and what every entry must satisfy.
 
 use super::*;
+use crate::dist::Dist;
+use crate::lang::builtins::Scalar;
 use std::collections::HashSet;
+use std::sync::Arc;
 
 fn matched(name: &str, args: &[Option<&str>]) -> Result<Vec<Option<usize>>, String> {
     let index = TABLE.find("", name).unwrap();
@@ -114,8 +117,10 @@ fn forms_for_single_numbers_are_the_functions_themselves() {
         let Some(scalar) = b.scalar else { continue };
         let call = |values: &[Value]| {
             let values: Vec<&Value> = values.iter().collect();
+            let args = Args { builtin: &b, values: &values };
             match b.kind {
-                Kind::Function(f) => f(&Args { builtin: b, values: &values }).unwrap(),
+                Kind::Function(f) => f(&args).unwrap(),
+                Kind::Distribution(f) => f(&args).map_or(Value::Unit, |d| Value::str(&format!("{d:?}"))),
                 _ => panic!("{} is no function", b.name),
             }
         };
@@ -127,6 +132,23 @@ fn forms_for_single_numbers_are_the_functions_themselves() {
                     Scalar::Binary(f) => (Value::Num(f(x, y)), call(&[Value::Num(x), Value::Num(y)])),
                     Scalar::Test(f) => (Value::Bool(f(x, y)), call(&[Value::Num(x), Value::Num(y)])),
                     Scalar::Logic(f) => (Value::Bool(f(x > 0.0)), call(&[Value::Bool(x > 0.0)])),
+                    Scalar::Family { make, log_density } => {
+                        let parameters: Vec<f64> = [x, y, x].into_iter().take(b.args.len()).collect();
+                        let values: Vec<Value> = parameters.iter().map(|x| Value::Num(*x)).collect();
+                        let (found, wanted) =
+                            (log_density(&parameters, 0.5), make(&parameters).map(|d| d.log_density_num(0.5)));
+                        assert_eq!(found.map(f64::to_bits), wanted.map(f64::to_bits), "{}({parameters:?})", b.name);
+                        let found = make(&parameters).map_or(Value::Unit, |d| Value::str(&format!("{d:?}")));
+                        (found, call(&values))
+                    }
+                    Scalar::Weights { make, log_probability } => {
+                        let weights: Arc<[f64]> = [x, 1.0, y].into();
+                        let (dist, made) = (make(&weights), call(&[Value::Array(Arc::clone(&weights))]));
+                        let density = |d: &Dist| Value::Num(d.log_density_num(x));
+                        let (a, b) = (log_probability(&weights, x).map(Value::Num), dist.as_ref().map(density));
+                        assert!(a.unwrap_or_default().same(&b.unwrap_or_default()), "{weights:?}");
+                        (dist.map_or(Value::Unit, |d| Value::str(&format!("{d:?}"))), made)
+                    }
                 };
                 assert!(found.same(&wanted), "{}({x}, {y}): {found} or {wanted}", b.name);
             }

@@ -1,0 +1,116 @@
+//! Formulas against updates: the same weights and the same states, to the last bit, or no answer.
+
+use super::*;
+use crate::infer::{At, Gibbs, Kernel, Pick, Scope};
+use crate::trace::{Change, Draws, Selector, Target, Trace};
+use crate::{Model, Program};
+
+fn model(text: &str) -> Model {
+    Program::parse(text).unwrap().compile().unwrap()
+}
+
+/// How many weights and moves formulas gave, over the states that a chain visits; all are compared with updates.
+fn compared(text: &str) -> [usize; 2] {
+    let mut trace = model(text).simulate(1, 0).unwrap();
+    let every = Selector::Tag { name: "d".into(), value: None };
+    let mut kernel = Gibbs::new(Scope { selector: every.clone(), pick: Pick::One });
+    let (mut weights, mut moves) = (0, 0);
+    for step in 0..60 {
+        kernel.step(&mut trace, &At::new(1, 0, step)).unwrap();
+        let selection = trace.select(&every);
+        for t in trace.targets(selection).to_vec() {
+            let dist = trace.dist(t).unwrap();
+            let mut values = Vec::new();
+            assert!(dist.support().list_values(&mut values));
+            let current = trace.stored(t);
+            for value in values.into_iter().filter(|v| Some(v) != current.as_ref()) {
+                let formulas = trace.graph.formulas(&trace.code, t.node);
+                let by_formula = formulas.and_then(|f| trace.graph.weigh(&trace.code, t.node, &f, &dist, &value));
+                let by_update = trace.propose(&[(t, Change::Set(value.clone()))], Draws::default()).unwrap();
+                if let Some(w) = by_formula {
+                    weights += 1;
+                    assert_eq!(format!("{w:?}"), format!("{by_update:?}"), "{} = {value:?}", trace.address(t));
+                }
+                moves += usize::from(same_state(&mut trace, t, &dist, &value));
+            }
+        }
+    }
+    [weights, moves]
+}
+
+/// Compares the state that the pending update leads to with the one that a formula assigns, if it does; undoes both.
+fn same_state(trace: &mut Trace, t: Target, dist: &Dist, value: &Datum) -> bool {
+    let mut updated = trace.clone();
+    updated.commit();
+    trace.rollback();
+    let mut assigned = trace.clone();
+    if !assigned.assign(t, dist, value) {
+        return false;
+    }
+    let state =
+        |t: &Trace| format!("{:?} {:?} {:?}", t.choices(), t.observations(), [t.log_prior(), t.log_likelihood()]);
+    assert_eq!(state(&assigned), state(&updated));
+    // What is computed, too.
+    for (a, b) in assigned.graph.nodes.iter().zip(&updated.graph.nodes) {
+        assert!(a.value.same(&b.value) && a.state == b.state && a.refs == b.refs);
+    }
+    true
+}
+
+#[test]
+fn flags_of_a_regression() {
+    let [weights, moves] = compared(
+        "let x = [-1, 0.5, 2]; assume a ~ normal(0, 1); assume s ~ gamma(2, 2);
+         for i in 0 .. 3 {
+           f[i] ~ flip(0.3) #d;
+           observe normal(if f[i] { 0 } else { a * x[i] + 1 }, if f[i] { 10 } else { s }) = x[i] ** 2;
+         }",
+    );
+    assert!(weights > 100, "{weights}");
+    assert_eq!(moves, 0, "a selection that takes the other alternative is a matter for an update");
+}
+
+#[test]
+fn states_of_a_chain() {
+    let [weights, moves] = compared(
+        "let trans = [[0.8, 0.1, 0.1], [0.2, 0.7, 0.1], [0.3, 0.3, 0.4]]; let mu = [-1, 0, 2];
+         for t in 0 .. 6 {
+           z[t] ~ categorical(if t == 0 { [1, 2, 1] } else { trans[z[t - 1]] }) #d;
+           observe normal(mu[z[t]], 1) = t - 2;
+         }",
+    );
+    assert_eq!([weights, moves], [60 * 6 * 2; 2]);
+}
+
+#[test]
+fn conditions_and_arithmetic() {
+    let [weights, moves] = compared(
+        "let w = [0.2, 0.5, 0.3]; assume k ~ categorical(w) #d; assume b ~ flip(0.4) #d;
+         let u = if k * 2 > 1 { sqrt(k + 3) } else { -k }; let v = if !b { 1 } else { 2 };
+         factor log(1 + k ** 2); observe normal(u, v) = 0.7; assume n ~ binomial(4, 0.3 + k / 10) #d; observe poisson(n + 1) = 3;",
+    );
+    assert!(weights > 300 && moves > 150, "{weights} {moves}");
+}
+
+#[test]
+fn choices_that_would_vanish_are_left_to_updates() {
+    let once = "assume a ~ normal(0, 1); assume f ~ flip(0.5) #d; observe normal(if f { a } else { 0 }, 1) = 1;";
+    assert_eq!(compared(once), [0, 0]);
+    let twice = "assume a ~ normal(0, 1); assume f ~ flip(0.5) #d;
+        observe normal(if f { a } else { 0 }, 1) = 1; observe normal(if f { 2 * a } else { 1 }, 1) = 2;";
+    assert_eq!(compared(twice), [0, 0]);
+    let element = "for i in 0 .. 3 { b[i] ~ normal(i, 1); } assume f ~ flip(0.5) #d;
+        observe normal(if f { b[1] } else { 0 }, 1) = 1;";
+    assert_eq!(compared(element), [0, 0]);
+    let held = format!("{twice} observe normal(a, 1) = 0;");
+    assert_eq!(compared(&held)[0], 60);
+}
+
+#[test]
+fn choices_read_twice_from_one_frame_are_left_to_updates() {
+    let text = "for t in 0 .. 4 {
+           z[t] ~ flip(0.4) #d;
+           observe normal(if t > 0 { if z[t - 1] == z[0] { 1 } else { 2 } } else { 0 }, 1) = t;
+         }";
+    compared(text);
+}
