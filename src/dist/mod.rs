@@ -4,6 +4,7 @@
 //! that is total: a log density is -inf off the support (a value of the wrong kind included) and never NaN.
 
 mod ascending;
+mod batch;
 mod beta;
 mod binomial;
 mod categorical;
@@ -53,6 +54,7 @@ mod von_mises;
 mod weibull;
 mod wishart;
 
+pub use batch::{Batch, batch};
 pub use beta::Beta;
 pub use binomial::Binomial;
 pub use categorical::Categorical;

@@ -4,10 +4,10 @@
 
 use super::args::MAX_ELEMENTS;
 use super::covariance::CovarianceValue;
-use super::derivative::{self, of_two};
+use super::derivative::{Unary, binary_form};
 use super::elementwise::{array, array_len, broadcast, numeric, unary};
 use super::math::pow_slopes;
-use super::{Arg, Args, Builtin, Type, arg, function};
+use super::{Arg, Args, Builtin, Derivative, Type, arg, function};
 use crate::lang::error::Fault;
 use crate::lang::value::Value;
 use std::cmp::Ordering;
@@ -20,35 +20,45 @@ const fn infix(name: &'static str, returns: Type, doc: &'static str, f: fn(&Args
     function(name, SECTION, SIDES, returns, doc, f)
 }
 
+/// The row of an operator on numbers with its slopes, of x, y and z.
+macro_rules! arithmetic {
+    ($name:literal, $doc:literal, $f:expr, $slopes:expr) => {
+        infix($name, Type::Nums, $doc, |a| arithmetic(a, $f)).derivative(binary_form!($f, $slopes))
+    };
+}
+
 pub(super) const TABLE: &[Builtin] = &[
-    infix("+", Type::Any, "Sum of numbers, element by element; joins two strings; adds covariances.", add).pull(
-        |a, z, by| match z {
-            Value::Object(_) => {
+    infix("+", Type::Any, "Sum of numbers, element by element; joins two strings; adds covariances.", add).derivative(
+        binary_form!(
+            |x, y| x + y,
+            |_, _, _| [1.0, 1.0],
+            Some(|a, _, by| {
                 CovarianceValue::pull_both(a.get(0), a.get(1), by).map(|both| both.into_iter().collect())
-            }
-            _ => of_two(a, z, by, |_, _, _| [1.0, 1.0]),
-        },
+            })
+        ),
     ),
-    infix("-", Type::Nums, "Difference, element by element.", |a| arithmetic(a, |x, y| x - y))
-        .pull(|a, z, by| of_two(a, z, by, |_, _, _| [1.0, -1.0])),
+    arithmetic!("-", "Difference, element by element.", |x, y| x - y, |_, _, _| [1.0, -1.0]),
     infix(
         "*",
         Type::Any,
         "Product of numbers, element by element; applies a placement to a solid; multiplies covariances.",
         multiply,
     )
-    .pull(|a, z, by| match (a.get(0), z) {
-        (Value::Object(o), Value::Object(_)) => o.pull_product(a.get(1), by).map(|both| both.into_iter().collect()),
-        _ => of_two(a, z, by, |x, y, _| [y, x]),
+    .derivative(binary_form!(
+        |x, y| x * y,
+        |x, y, _| [y, x],
+        Some(|a, _, by| match a.get(0) {
+            Value::Object(o) => o.pull_product(a.get(1), by).map(|both| both.into_iter().collect()),
+            _ => None,
+        })
+    )),
+    arithmetic!("/", "Quotient, element by element; by zero it is an infinity or NaN.", |x, y| x / y, |_, y, z| {
+        [1.0 / y, -z / y]
     }),
-    infix("/", Type::Nums, "Quotient, element by element; by zero it is an infinity or NaN.", |a| {
-        arithmetic(a, |x, y| x / y)
-    })
-    .pull(|a, z, by| of_two(a, z, by, |_, y, z| [1.0 / y, -z / y])),
-    infix("%", Type::Nums, "Remainder with the sign of the divisor: `-1 % 3` is 2.", |a| arithmetic(a, remainder))
-        .pull(|a, z, by| of_two(a, z, by, |x, y, _| [1.0, -libm::floor(x / y)])),
-    infix("**", Type::Nums, "Power, element by element.", |a| arithmetic(a, libm::pow))
-        .pull(|a, z, by| of_two(a, z, by, pow_slopes)),
+    arithmetic!("%", "Remainder with the sign of the divisor: `-1 % 3` is 2.", remainder, |x, y, _| {
+        [1.0, -libm::floor(x / y)]
+    }),
+    arithmetic!("**", "Power, element by element.", libm::pow, pow_slopes),
     function(
         "neg",
         SECTION,
@@ -57,7 +67,7 @@ pub(super) const TABLE: &[Builtin] = &[
         "Negation `-a`, element by element.",
         negate,
     )
-    .pull(|a, y, by| derivative::unary(a, y, by, |_, _| -1.0)),
+    .derivative(Derivative::Unary(&Unary { value: |x| -x, slope: |_, _| -1.0 })),
     function(
         "not",
         SECTION,
