@@ -16,6 +16,18 @@ pub trait Batch: fmt::Debug + Send + Sync {
     fn pull(&self, buffer: &[f64], by: &mut [f64], x: Column, params: &[Column], n: usize, weight: f64);
 }
 
+/// A batch of one family: one that knows the density and slopes of its first distribution, too.
+pub(super) trait Family: Batch {
+    /// Makes the distributions anew where parameters have moved; false if one is outside its domain.
+    fn refresh(&mut self, buffer: &[f64], params: &[Column]) -> bool;
+
+    /// The log density of a number under the first of them.
+    fn log_density_num(&self, x: f64) -> f64;
+
+    /// Its derivative by the number, and those by the parameters.
+    fn slopes_num(&self, x: f64, params: &mut [f64; 3]) -> f64;
+}
+
 /// A distribution of one number with `N` parameters.
 trait Member<const N: usize>: Clone + fmt::Debug + Send + Sync {
     /// With these parameters, if they are in its domain.
@@ -124,8 +136,7 @@ impl Member<1> for Flip {
 #[derive(Debug)]
 struct Members<T, const N: usize>(Vec<(Option<[f64; N]>, T)>);
 
-impl<T: Member<N>, const N: usize> Members<T, N> {
-    /// Makes the distributions anew where parameters have moved.
+impl<T: Member<N>, const N: usize> Family for Members<T, N> {
     fn refresh(&mut self, buffer: &[f64], params: &[Column]) -> bool {
         let Ok(columns) = <&[Column; N]>::try_from(params) else { return true };
         // Where all but the first parameter are shared, so is most of the work.
@@ -140,6 +151,17 @@ impl<T: Member<N>, const N: usize> Members<T, N> {
             self.0[i] = (Some(p), made);
         }
         true
+    }
+
+    fn log_density_num(&self, x: f64) -> f64 {
+        self.0.first().map_or(f64::NEG_INFINITY, |(_, d)| d.log_density(x))
+    }
+
+    fn slopes_num(&self, x: f64, params: &mut [f64; 3]) -> f64 {
+        let Some((_, d)) = self.0.first() else { return 0.0 };
+        let (by, own) = d.slopes(x);
+        params.iter_mut().zip(own).for_each(|(p, s)| *p = s);
+        by
     }
 }
 
@@ -183,6 +205,11 @@ impl<T: Member<N>, const N: usize> Batch for Members<T, N> {
 /// The batch of a distribution over a number, or of one with elements that are all of one family; its parameters lie in these
 /// columns, or stay. `None` for other distributions, and where columns do not fit the family.
 pub fn batch(dist: &Dist, params: &[Column]) -> Option<Box<dyn Batch>> {
+    Some(family(dist, params)?)
+}
+
+/// The same, as one of one family.
+pub(super) fn family(dist: &Dist, params: &[Column]) -> Option<Box<dyn Family>> {
     let parts = match dist {
         Dist::Iid(d) => std::slice::from_ref(d.one()),
         Dist::Product(d) => d.parts(),
@@ -205,4 +232,88 @@ pub fn batch(dist: &Dist, params: &[Column]) -> Option<Box<dyn Batch>> {
         InvGamma: 2, Cauchy: 2, Laplace: 2, VonMises: 2, Weibull: 2, NegBinomial: 2, Geometric: 1, Flat: 0, Flip: 1,
         Binomial: 2, Poisson: 1
     )
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+    use std::sync::Arc;
+
+    /// Parameters that stay near the middle of every family's domain.
+    fn made(family: &str, p: &[f64]) -> Option<Dist> {
+        Some(match (family, p) {
+            ("normal", [a, b]) => Dist::Normal(Normal::new(*a, *b).ok()?),
+            ("student_t", [a, b, c]) => Dist::StudentT(StudentT::new(*a, *b, *c).ok()?),
+            ("gamma", [a, b]) => Dist::Gamma(Gamma::new(*a, *b).ok()?),
+            ("poisson", [a]) => Dist::Poisson(Poisson::new(*a).ok()?),
+            ("flip", [a]) => Dist::Flip(Flip::new(*a).ok()?),
+            _ => return None,
+        })
+    }
+
+    #[test]
+    fn many_at_once_are_as_one_at_a_time() {
+        for (family, width, seen) in [
+            ("normal", 2, [0.3, 1.2, 2.0]),
+            ("student_t", 3, [0.3, 1.2, 2.0]),
+            ("gamma", 2, [0.3, 1.2, 2.0]),
+            ("poisson", 1, [0.0, 2.0, 3.0]),
+            ("flip", 1, [0.0, 1.0, 1.0]),
+        ] {
+            // Which parameters have a number for each element.
+            for shape in 0..1 << width {
+                // The numbers, one column a parameter, then what is seen.
+                let at = |shift: f64, k: usize, i: usize| {
+                    0.4 + 0.1 * k as f64 + shift + if shape >> k & 1 == 1 { 0.07 * i as f64 } else { 0.0 }
+                };
+                let n = 3;
+                let fill = |shift: f64| {
+                    let mut v: Vec<f64> = (0..width).flat_map(|k| (0..n).map(move |i| at(shift, k, i))).collect();
+                    v.extend(seen);
+                    v
+                };
+                let columns: Vec<Column> =
+                    (0..width).map(|k| Column { at: k * n, step: shape >> k & 1, live: true }).collect();
+                let x = Column { at: width * n, step: 1, live: true };
+                let one = |v: &[f64], i: usize| {
+                    let p: Vec<f64> = columns.iter().map(|c| c.get(v, i)).collect();
+                    made(family, &p).unwrap()
+                };
+                let first = fill(0.0);
+                let dist = match shape {
+                    0 => one(&first, 0),
+                    _ => Dist::Product(Arc::new(Product::new((0..n).map(|i| one(&first, i)).collect()).unwrap())),
+                };
+                let mut b = batch(&dist, &columns).unwrap();
+                for shift in [0.0, 0.05, 0.05, 0.1] {
+                    let v = fill(shift);
+                    let (mut sum, mut expected) = (ExactSum::default(), ExactSum::default());
+                    assert!(b.score(&v, x, &columns, n, &mut sum));
+                    let mut by = vec![0.0; v.len()];
+                    b.pull(&v, &mut by, x, &columns, n, 2.0);
+                    let mut slopes = vec![0.0; v.len()];
+                    for (i, s) in seen.iter().enumerate() {
+                        let datum = if family == "flip" { Datum::Bool(*s != 0.0) } else { Datum::Num(*s) };
+                        let d = one(&v, i);
+                        expected.add(d.log_density(&datum));
+                        let g = d.gradient(&datum).unwrap();
+                        slopes[x.at + i] += 2.0 * g.x.first().copied().unwrap_or(0.0);
+                        columns.iter().zip(&g.params).for_each(|(c, p)| slopes[c.at + i * c.step] += 2.0 * p);
+                    }
+                    assert_eq!(sum, expected, "{family} {shape}");
+                    let off = by.iter().zip(&slopes).map(|(a, b)| (a - b).abs()).fold(0.0, f64::max);
+                    assert!(off < 1e-12, "{family} {shape}: {by:?}, one at a time {slopes:?}");
+                }
+                // Parameters outside the domain.
+                let v = fill(-9.0);
+                assert!(!b.score(&v, x, &columns, n, &mut ExactSum::default()), "{family}");
+            }
+        }
+    }
+
+    #[test]
+    fn families_do_not_mix() {
+        let parts = vec![made("normal", &[0.0, 1.0]).unwrap(), made("gamma", &[1.0, 1.0]).unwrap()];
+        assert!(batch(&Dist::Product(Arc::new(Product::new(parts).unwrap())), &[]).is_none());
+    }
 }

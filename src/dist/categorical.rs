@@ -25,6 +25,11 @@ impl Categorical {
         Ok(Categorical { weights, total })
     }
 
+    /// The weights.
+    pub(super) fn weights(&self) -> &[f64] {
+        &self.weights
+    }
+
     /// The probability of index `i`.
     pub fn probability(&self, i: usize) -> f64 {
         self.weights.get(i).map_or(0.0, |w| w / self.total)

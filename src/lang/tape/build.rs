@@ -5,7 +5,7 @@
 use super::form::{Form, Made};
 use super::op::Op;
 use super::{Input, Sums, Tape};
-use crate::dist::{Dist, Support, batch};
+use crate::dist::{Dist, Support, batch, batch_of_mixture};
 use crate::lang::builtins::{Binary, Builtin, CovarianceValue, Derivative, Kind, Reduction, Unary};
 use crate::lang::value::Value;
 use crate::num::Column;
@@ -259,7 +259,7 @@ impl Builder {
             _ => None,
         };
         let params = inner.as_ref().map_or(&args[..], |m| &m.args);
-        if self.density(dist, params, x, observed).is_some() {
+        if self.mixture(dist, params, x, observed).is_some() || self.density(dist, params, x, observed).is_some() {
             return Some(());
         }
         self.score(Form::Made(Arc::new(Made { builtin: *builtin, args: args.into() })), x.clone(), observed)
@@ -282,6 +282,29 @@ impl Builder {
 
     fn score(&mut self, dist: Form, x: Form, observed: bool) -> Option<()> {
         self.ops.push(Op::Score { dist, x, observed });
+        Some(())
+    }
+
+    /// Numbers under a mixture.
+    fn mixture(&mut self, dist: &Dist, params: &[Form], x: &Form, observed: bool) -> Option<()> {
+        let (Dist::Mixture(d), [weights, components]) = (dist, params) else { return None };
+        // As with other distributions of a number, many observed values are independent.
+        if !observed && x.len().is_some() {
+            return None;
+        }
+        let mut columns = Vec::new();
+        for i in 0..components.len()? {
+            columns.push(match components.element(i)? {
+                Form::Made(m) => m.args.iter().map(|f| self.column(f)).collect::<Option<_>>()?,
+                Form::Fixed(_) => SmallVec::new(),
+                _ => return None,
+            });
+        }
+        let weights = if weights.is_fixed() { None } else { Some(self.column(weights)?) };
+        let batch = batch_of_mixture(d, weights, columns)?;
+        let x_column = self.column(x)?;
+        let n = x.len().unwrap_or(1);
+        self.ops.push(Op::Density { batch, x: x_column, params: SmallVec::new(), n, observed });
         Some(())
     }
 

@@ -15,7 +15,7 @@ mod op;
 pub use build::Builder;
 pub use form::Form;
 
-use crate::dist::Support;
+use crate::dist::{Datum, Support};
 use crate::lang::value::Value;
 use crate::num::ExactSum;
 use op::Op;
@@ -101,6 +101,16 @@ impl Tape {
             self.sums.jacobian.add(jacobian);
         }
         self.forward()
+    }
+
+    /// The values of the inputs at a point of unconstrained space, in order.
+    pub fn images(&self, y: &[f64]) -> impl Iterator<Item = Datum> {
+        let mut rest = y;
+        self.inputs.iter().map(move |input| {
+            let (own, after) = rest.split_at(input.dimension.min(rest.len()));
+            rest = after;
+            input.support.from_free(own).0
+        })
     }
 
     fn forward(&mut self) -> bool {

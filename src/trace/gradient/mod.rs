@@ -11,7 +11,7 @@ mod record;
 mod recording;
 mod scores;
 
-pub(crate) use recording::Recording;
+pub use recording::Recording;
 
 use super::choices::Target;
 use super::demand::Failure;

@@ -5,12 +5,12 @@
 
 use crate::lang::tape::{Sums, Tape};
 use crate::num::ExactSum;
-use crate::trace::{NONE, Target, Trace, Weight};
+use crate::trace::{Change, NONE, Target, Trace, Weight};
 use std::sync::Arc;
 
 /// The log density of a trace as a function of the unconstrained coordinates of some of its choices.
 #[derive(Debug)]
-pub(crate) struct Recording {
+pub struct Recording {
     tape: Tape,
     targets: Vec<Target>,
     identity: Arc<()>,
@@ -20,8 +20,9 @@ pub(crate) struct Recording {
 }
 
 impl Trace {
-    /// Records the density by some continuous choices; `None` where a tape cannot do what the program does.
-    pub(crate) fn record(&mut self, targets: &[Target]) -> Option<Recording> {
+    /// Records the log density as a function of the unconstrained coordinates of some continuous choices, to be worked out many times
+    /// without proposals; `None` where that cannot be told in a straight line. [`Recording::begin`] comes first.
+    pub fn record(&mut self, targets: &[Target]) -> Option<Recording> {
         self.rollback();
         let tape = self.graph.record(&self.code, targets)?;
         let identity = Arc::clone(&self.identity);
@@ -72,6 +73,11 @@ impl Recording {
             log_jacobian: new.jacobian.value(),
             ..Weight::default()
         })
+    }
+
+    /// The changes that make these coordinates the state, appended to a list.
+    pub fn changes(&self, y: &[f64], out: &mut Vec<(Target, Change)>) {
+        out.extend(self.targets.iter().copied().zip(self.tape.images(y).map(Change::Set)));
     }
 
     /// The log Jacobian of the state that densities are relative to.

@@ -43,10 +43,10 @@ impl Layout {
         self.ranges.last().map_or(0, |r| r.end)
     }
 
-    /// The proposal of these coordinates.
-    pub fn changes(&self, y: &[f64]) -> Vec<(Target, Change)> {
+    /// The proposal of these coordinates, appended to a list.
+    pub fn changes(&self, y: &[f64], out: &mut Vec<(Target, Change)>) {
         let free = |r: &Range<usize>| Change::Free(y.get(r.clone()).unwrap_or_default().to_vec());
-        self.targets.iter().copied().zip(self.ranges.iter().map(free)).collect()
+        out.extend(self.targets.iter().copied().zip(self.ranges.iter().map(free)));
     }
 }
 
@@ -59,6 +59,7 @@ pub(super) struct Memory {
     /// How many recordings are left out, and how many were the last time.
     wait: u32,
     waited: u32,
+    changes: Vec<(Target, Change)>,
     points: Vec<Arc<Point>>,
     lists: Vec<Arc<Vec<f64>>>,
 }
@@ -125,6 +126,16 @@ impl Memory {
     /// The log Jacobian of the state the trace is in.
     pub fn log_jacobian(&self) -> f64 {
         self.tape.as_ref().map_or(0.0, |(tape, _)| tape.log_jacobian())
+    }
+
+    /// The changes that make these coordinates the state: values, where a tape knows them, so that nothing is allocated for them.
+    pub fn changes(&mut self, y: &[f64], taped: bool, layout: &Layout) -> &[(Target, Change)] {
+        self.changes.clear();
+        match &self.tape {
+            Some((tape, _)) if taped => tape.changes(y, &mut self.changes),
+            _ => layout.changes(y, &mut self.changes),
+        }
+        &self.changes
     }
 
     /// A place to fill in, that nothing else refers to.

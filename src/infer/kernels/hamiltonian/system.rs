@@ -98,12 +98,12 @@ impl<'a> System<'a> {
         self.trace.gradient(&self.layout.targets, self.at.power, &mut point.gradient)
     }
 
-    /// Goes to a place: its log density, and with `force` its gradient. False where there is none.
-    fn evaluate(&mut self, point: &mut Point, force: bool) -> TraceResult<bool> {
+    /// The log density and force at a place that was filled in. False where there is none.
+    fn evaluate(&mut self, point: &mut Point) -> TraceResult<bool> {
         if point.y.iter().any(|x| !x.is_finite()) {
             return Ok(false);
         }
-        if self.taped && force && let Some(w) = self.memory.weigh(&point.y) {
+        if self.taped && let Some(w) = self.memory.weigh(&point.y) {
             point.log_density = self.at.tempered(&w) + w.log_jacobian - self.jacobian;
             if !point.log_density.is_finite() {
                 return Ok(false);
@@ -112,34 +112,29 @@ impl<'a> System<'a> {
                 return Ok(point.gradient.iter().all(|g| g.is_finite()));
             }
         }
-        let changes = self.layout.changes(&point.y);
-        let Some(w) = recoverable(self.trace.propose(&changes, self.at.draws(0)))? else { return Ok(false) };
-        point.log_density = self.at.tempered(&w) + w.log_jacobian - self.jacobian;
-        if w.appeared + w.vanished > 0 || !point.log_density.is_finite() {
-            return Ok(false);
-        }
-        if force {
-            self.force(point)?;
-        }
-        Ok(!force || point.gradient.iter().all(|g| g.is_finite()))
+        let Some(log_density) = self.propose(&point.y, false)? else { return Ok(false) };
+        point.log_density = log_density;
+        self.force(point)?;
+        Ok(point.gradient.iter().all(|g| g.is_finite()))
     }
 
-    /// A place that was filled in by `make`, with its density and force; `None` where there is none.
-    fn arrive(&mut self, make: impl FnOnce(&mut Point)) -> TraceResult<Option<Arc<Point>>> {
-        let mut shared = self.memory.point();
-        let Some(point) = Arc::get_mut(&mut shared) else { return Ok(None) };
-        make(point);
-        let there = self.evaluate(point, true)?;
-        self.memory.keep(&shared);
-        Ok(there.then_some(shared))
+    /// Proposes a place: its log density, `None` where there is none.
+    fn propose(&mut self, y: &[f64], as_values: bool) -> TraceResult<Option<f64>> {
+        let changes = self.memory.changes(y, as_values, &self.layout);
+        let Some(w) = recoverable(self.trace.propose(changes, self.at.draws(0)))? else { return Ok(None) };
+        let log_density = self.at.tempered(&w) + w.log_jacobian - self.jacobian;
+        Ok((w.appeared + w.vanished == 0 && log_density.is_finite()).then_some(log_density))
     }
 
     /// The log density and force at a place. `None` where there is none.
     pub fn go(&mut self, y: impl Iterator<Item = f64>) -> TraceResult<Option<Arc<Point>>> {
-        self.arrive(|point| {
-            point.y.clear();
-            point.y.extend(y);
-        })
+        let mut shared = self.memory.point();
+        let Some(point) = Arc::get_mut(&mut shared) else { return Ok(None) };
+        point.y.clear();
+        point.y.extend(y);
+        let there = self.evaluate(point)?;
+        self.memory.keep(&shared);
+        Ok(there.then_some(shared))
     }
 
     /// One leapfrog step with these inverse masses.
@@ -150,7 +145,7 @@ impl<'a> System<'a> {
         to.momentum.extend(from.momentum.iter().zip(&from.gradient).map(|(p, g)| p + 0.5 * step * g));
         to.y.clear();
         to.y.extend(from.y.iter().zip(&to.momentum).zip(inverse_mass).map(|((y, p), m)| y + step * m * p));
-        let there = self.evaluate(to, true)?;
+        let there = self.evaluate(to)?;
         to.momentum.iter_mut().zip(&to.gradient).for_each(|(p, g)| *p += 0.5 * step * g);
         to.velocity.clear();
         to.velocity.extend(to.momentum.iter().zip(inverse_mass).map(|(p, m)| p * m));
@@ -183,8 +178,8 @@ impl<'a> System<'a> {
             self.trace.rollback();
             return Ok(false);
         };
-        let mut point = Point { y: point.y.clone(), ..Point::default() };
-        let there = self.evaluate(&mut point, false)?;
+        // The Jacobian does not matter any more, whether there is a density does.
+        let there = self.propose(&point.y, self.taped)?.is_some();
         if there {
             self.trace.commit();
             self.memory.moved(self.trace);
