@@ -262,7 +262,11 @@ impl Builder {
         if self.mixture(dist, params, x, observed).is_some() || self.density(dist, params, x, observed).is_some() {
             return Some(());
         }
-        self.score(Form::Made(Arc::new(Made { builtin: *builtin, args: args.into() })), x.clone(), observed)
+        let dist = match args.iter().all(Form::is_fixed) {
+            true => Form::Fixed(Value::Dist(Arc::new(dist.clone()))),
+            false => Form::Made(Arc::new(Made { builtin: *builtin, args: args.into() })),
+        };
+        self.score(dist, x.clone(), observed)
     }
 
     /// The log density of a value under a distribution or likelihood, which now is `now`.

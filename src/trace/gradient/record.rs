@@ -19,8 +19,9 @@ impl Graph {
     /// The nodes that an update of these choices may run.
     fn reached(&mut self, code: &Code, targets: &[Target]) -> Vec<NodeId> {
         let before = self.begin();
-        for t in targets {
-            if self.nodes[t.node as usize].state == State::Clean {
+        for (i, t) in targets.iter().enumerate() {
+            // Elements of one choice come one after the other.
+            if i == 0 || targets[i - 1].node != t.node {
                 self.mark_target(code, t.node);
             }
         }
@@ -175,13 +176,19 @@ impl Recorder<'_> {
                 let values = self.operands(frame, values);
                 Some(Form::Record(names.iter().cloned().zip(values).collect()))
             }
-            Op::Index { keys, .. } => {
+            Op::Index { base, keys } => {
                 for (form, k) in self.operands(frame, keys).iter().zip(keys.iter()) {
                     let now = graph.plain(code, frame, *k, &mut Deps::new()).clone();
                     self.tape.guard(form, &now)?;
                 }
-                let (source, keys) = self.view.indexed(n)?;
-                self.tape.index(&self.form(source), &keys)
+                match graph.resolve(frame, *base) {
+                    Some(_) => {
+                        let (source, keys) = self.view.indexed(n)?;
+                        self.tape.index(&self.form(source), &keys)
+                    }
+                    // What a constant gives at keys that stay.
+                    None => Some(Form::Fixed(now)),
+                }
             }
             Op::Param { default, .. } => match (graph.argument(code, n), self.view.passed(n)) {
                 (Some((from, o)), _) => Some(self.operand(from, o)),
@@ -325,6 +332,7 @@ fn has_fixed_support(dist: &Dist, params: &[Form]) -> bool {
         d if !d.has_moving_support() => true,
         Dist::HalfCauchy(_) => params.first().is_some_and(Form::is_fixed),
         Dist::TruncatedNormal(_) => params.iter().skip(2).all(Form::is_fixed),
+        Dist::Product(d) => d.parts().iter().all(|one| has_fixed_support(one, params)),
         _ => false,
     }
 }
