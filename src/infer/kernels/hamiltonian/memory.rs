@@ -82,27 +82,33 @@ impl Memory {
     /// Records a tape, if that has paid so far; false if there is none.
     pub fn record(&mut self, trace: &mut Trace, layout: &Arc<Layout>, y: &mut Vec<f64>) -> bool {
         if self.tape.take().is_some() {
-            self.waited = if self.runs < WORTH { (2 * self.waited).clamp(1, LONGEST) } else { 0 };
-            self.wait = self.waited;
+            if self.runs < WORTH { self.back_off() } else { (self.wait, self.waited) = (0, 0) }
         }
         if self.wait > 0 {
             self.wait -= 1;
             return false;
         }
         self.runs = 0;
-        let Some(mut tape) = trace.record(&layout.targets) else { return false };
-        let told = tape.begin(trace, y);
-        self.tape = told.then(|| (tape, Arc::clone(layout)));
+        self.tape = trace.record(&layout.targets).map(|tape| (tape, Arc::clone(layout)));
+        let told = self.tape.as_mut().is_some_and(|(tape, _)| tape.begin(trace, y));
+        if !told {
+            self.tape = None;
+            self.back_off();
+        }
         told
     }
 
-    /// There is no tape: the next try comes later, and ever later.
-    pub fn decline(&mut self) {
-        if self.wait == 0 {
-            self.tape = None;
-            self.waited = (2 * self.waited).clamp(1, LONGEST);
-            self.wait = self.waited;
+    /// Gives up a tape that cannot tell what is asked of it.
+    pub fn give_up(&mut self) {
+        if self.tape.take().is_some() {
+            self.back_off();
         }
+    }
+
+    /// The next try comes later, and ever later.
+    fn back_off(&mut self) {
+        self.waited = (2 * self.waited).clamp(1, LONGEST);
+        self.wait = self.waited;
     }
 
     /// Goes on after a commit of these choices.

@@ -72,7 +72,7 @@ impl<'a> System<'a> {
             && memory.gradient(&point.y, at.power, &mut point.gradient);
         let mut system = System { trace, at, memory, layout, taped, jacobian: jacobian.value() };
         if !taped {
-            system.memory.decline();
+            system.memory.give_up();
             system.force(point)?;
         }
         Ok(system.usable(here))
@@ -157,7 +157,9 @@ impl<'a> System<'a> {
     pub fn launch(&mut self, here: &Point, inverse_mass: &[f64], rng: &mut Stream) -> Arc<Point> {
         let mut shared = self.memory.point();
         if let Some(point) = Arc::get_mut(&mut shared) {
-            point.clone_from(here);
+            point.y.clone_from(&here.y);
+            point.gradient.clone_from(&here.gradient);
+            point.log_density = here.log_density;
             point.momentum.clear();
             point.momentum.extend(inverse_mass.iter().map(|m| rng.standard_normal() / m.sqrt()));
             point.velocity.clear();
