@@ -1,12 +1,14 @@
 //! Arithmetic that densities rest on: exact sums, stable functions in log space. All through `libm`, so that results are the
 //! same on every platform.
 
+mod column;
 mod exact;
 mod incomplete;
 mod saddle;
 mod special;
 mod tails;
 
+pub use column::Column;
 pub use exact::ExactSum;
 pub use incomplete::{chi_square_tail, upper_gamma};
 pub use saddle::{deviance, stirling_error};

@@ -3,7 +3,7 @@
 //! Counting allocations takes an allocator, whose trait is unsafe; it only counts and passes on to the system's.
 
 use pcadlang::Model;
-use pcadlang::infer::{At, Gibbs, Kernel, Mh, Pick, Scope};
+use pcadlang::infer::{At, Gibbs, Hmc, Kernel, Mh, Nuts, Pick, Scope};
 use pcadlang::trace::{Selector, Trace};
 use std::alloc::{GlobalAlloc, Layout, System};
 use std::cell::Cell;
@@ -88,4 +88,27 @@ fn redrawing_a_coefficient_that_all_points_read_allocates_nothing() {
     let mut trace = model.simulate(1, 0).unwrap_or_else(|e| panic!("{e}"));
     let count = allocations(&mut Mh::new(scope("coef")), &mut trace, 2000);
     assert_eq!(count, 0, "{count} allocations in 2,000 steps");
+}
+
+const SCHOOLS: &str = "let y = [28, 8, -3, 7, -1, 1, 18, 12]; let sigma = [15, 10, 16, 11, 9, 11, 10, 18];
+    assume mu ~ normal(0, 5); assume tau ~ half_normal(5); assume e ~ iid(normal(0, 1), 8);
+    observe normal(mu + tau * e, sigma) = y;";
+
+fn schools(kernel: &mut dyn Kernel, steps: u64) -> u64 {
+    let model = Model::from_text(SCHOOLS).unwrap_or_else(|e| panic!("{e}"));
+    let mut trace = model.simulate(1, 0).unwrap_or_else(|e| panic!("{e}"));
+    allocations(kernel, &mut trace, steps)
+}
+
+#[test]
+fn leapfrog_steps_allocate_nothing() {
+    let all = || Scope { selector: Selector::All, pick: Pick::All };
+    let steps = 200;
+    // Steps so short that all are accepted: what a transition allocates is for its one proposal.
+    let of = |leaps: u32| schools(&mut Hmc::new(all(), leaps, Some(1e-3)), steps);
+    let (few, many) = (of(2), of(40));
+    assert_eq!(few, many, "{few} allocations in {steps} transitions of 2 leapfrog steps, {many} in those of 40");
+    assert!(few <= 40 * steps, "{few} allocations in {steps} transitions");
+    let walk = schools(&mut Nuts::new(all(), 10), steps);
+    assert!(walk <= 40 * steps, "{walk} allocations in {steps} transitions of nuts");
 }

@@ -1,6 +1,9 @@
 //! Gradients through traces against central differences of the log joint density in the unconstrained space: the built-ins,
 //! the distributions and their transforms, structure, scenes.
 
+#[path = "common/tape.rs"]
+mod tape;
+
 use pcadlang::Program;
 use pcadlang::dist::Datum;
 use pcadlang::lang::builtins::scene::{DepthValue, ImageValue, MaskValue};
@@ -33,6 +36,10 @@ fn check(text: &str) {
     for seed in 0..4 {
         let mut trace = model.simulate(seed, 0).unwrap_or_else(|e| panic!("{text}\n{e}"));
         compare(&mut trace, text);
+        // White noise moves with its prior, and supports with their bounds: both stay with the trace.
+        let stays = ["whitened", "f ~ gp(", "uniform(a", "uniform(u", "half_cauchy(a", "a - s", "lo = a"];
+        let told = tape::compare_tape(&mut trace, text);
+        assert!(told.points > 0 || stays.iter().any(|s| text.contains(s)), "{text}: {told:?}");
     }
 }
 

@@ -1,5 +1,8 @@
 //! The same chain, bit for bit, by increments and by running everything again: every shipped program, and random ones.
 
+#[path = "common/tape.rs"]
+mod tape;
+
 use pcadlang::Program;
 use pcadlang::infer::RunOptions;
 use proptest::prelude::*;
@@ -76,7 +79,8 @@ fn program() -> impl Strategy<Value = String> {
              observe normal({a}, 2) = 1;
              infer {{ warmup 20 {{ drift(@**); }}
                repeat 60 {{ mix {{ 0.3 => mh(one(@**)); 0.2 => gibbs(one($finite)); 0.2 => gibbs(each($finite));
-                                   0.2 => drift(one($continuous)); 0.1 => block(@**); }} }} }}",
+                                   0.2 => drift(one($continuous)); 0.1 => block(@**);
+                                   0.1 => nuts($continuous, max_depth = 3); }} }} }}",
             choices.join("\n")
         )
     })
@@ -88,5 +92,9 @@ proptest! {
     fn random_programs(text in program()) {
         let parse = || Program::parse(&text).unwrap_or_else(|e| panic!("{e}\n{text}"));
         same(&text, parse, 60, 20);
+        let model = parse().compile().unwrap_or_else(|e| panic!("{e}\n{text}"));
+        for seed in 0..3 {
+            tape::compare_tape(&mut model.simulate(seed, 0).unwrap_or_else(|e| panic!("{e}\n{text}")), &text);
+        }
     }
 }

@@ -24,6 +24,11 @@ impl Categorical {
         total(weights).map(|total| log_probability(weights, total, x))
     }
 
+    /// The weights.
+    pub(super) fn weights(&self) -> &[f64] {
+        &self.weights
+    }
+
     /// The probability of index `i`.
     pub fn probability(&self, i: usize) -> f64 {
         self.weights.get(i).map_or(0.0, |w| w / self.total)

@@ -21,6 +21,12 @@ impl Flip {
     pub fn log_probability(&self, x: bool) -> f64 {
         if x { libm::log(self.p) } else { libm::log1p(-self.p) }
     }
+
+    /// Its derivative by the probability, where it is finite.
+    #[inline]
+    pub(super) fn slope(&self, x: bool) -> f64 {
+        if x { 1.0 / self.p } else { -1.0 / (1.0 - self.p) }
+    }
 }
 
 impl Distribution for Flip {
@@ -46,8 +52,9 @@ impl Distribution for Flip {
 
     fn gradient(&self, x: &Datum) -> Option<Gradient> {
         match x {
-            Datum::Bool(true) if self.p > 0.0 => Some(Gradient { x: Vec::new(), params: vec![1.0 / self.p] }),
-            Datum::Bool(false) if self.p < 1.0 => Some(Gradient { x: Vec::new(), params: vec![-1.0 / (1.0 - self.p)] }),
+            Datum::Bool(x) if self.log_probability(*x).is_finite() => {
+                Some(Gradient { x: Vec::new(), params: vec![self.slope(*x)] })
+            }
             _ => None,
         }
     }

@@ -3,6 +3,7 @@
 use super::{Categorical, Datum, Dist, Distribution, Gradient, ParamError, Scalar, Support};
 use crate::num::log_sum_exp;
 use crate::rng::Stream;
+use smallvec::SmallVec;
 
 /// `mixture(weights, components)`. The density is the weighted mean of the components' densities.
 ///
@@ -37,9 +38,8 @@ impl Mixture {
         let support = supports
             .try_fold(first, union)
             .ok_or_else(|| bad("components", names(), "must have the same kind of values"))?;
-        let total: f64 = weights.iter().sum();
-        let log_shares = weights.iter().map(|w| libm::log(*w) - libm::log(total)).collect();
-        Ok(Mixture { weights: choice, log_shares, total, components, support })
+        let (total, log_shares) = Mixture::log_shares(weights, Vec::new());
+        Ok(Mixture { weights: choice, log_shares: log_shares.into(), total, components, support })
     }
 
     /// The components' log densities, weights not counted.
@@ -47,18 +47,51 @@ impl Mixture {
         self.components.iter().map(|c| c.log_density(x)).collect()
     }
 
-    /// The log density: a component without weight counts for nothing, not even at its poles.
-    fn total_score(&self, scores: &[f64]) -> f64 {
-        let weighted = self.log_shares.iter().zip(scores).filter(|(w, _)| **w > f64::NEG_INFINITY);
-        log_sum_exp(&weighted.map(|(w, s)| w + s).collect::<Vec<_>>())
-    }
-
     /// The probability that a value is of each component; nothing where the density is not positive and finite.
     pub fn responsibilities(&self, x: &Datum) -> Option<Vec<f64>> {
         let scores = self.scores(x);
-        let all = self.total_score(&scores);
-        let share = |(w, s): (&f64, &f64)| if *w > f64::NEG_INFINITY { libm::exp(w + s - all) } else { 0.0 };
+        let all = Self::total(&self.log_shares, &scores);
+        let share = |(w, s): (&f64, &f64)| Self::share(*w, *s, all);
         all.is_finite().then(|| self.log_shares.iter().zip(&scores).map(share).collect())
+    }
+
+    /// The distributions it mixes.
+    pub(super) fn components(&self) -> &[Dist] {
+        &self.components
+    }
+
+    /// The weights, the log of each one's share of their sum, and the sum.
+    pub(super) fn shares(&self) -> (&[f64], &[f64], f64) {
+        (self.weights.weights(), &self.log_shares, self.total)
+    }
+}
+
+impl Mixture {
+    /// The log density from the components' log densities: a component without weight counts for nothing, not even at its poles.
+    #[inline]
+    pub(super) fn total(log_shares: &[f64], scores: &[f64]) -> f64 {
+        let weighted = log_shares.iter().zip(scores).filter(|(w, _)| **w > f64::NEG_INFINITY);
+        log_sum_exp(&weighted.map(|(w, s)| w + s).collect::<SmallVec<[f64; 8]>>())
+    }
+
+    /// The probability of a component.
+    #[inline]
+    pub(super) fn share(log_share: f64, score: f64, all: f64) -> f64 {
+        if log_share > f64::NEG_INFINITY { libm::exp(log_share + score - all) } else { 0.0 }
+    }
+
+    /// The derivative of the log density by a weight.
+    #[inline]
+    pub(super) fn by_weight(score: f64, all: f64, total: f64) -> f64 {
+        (libm::exp(score - all).min(f64::MAX) - 1.0) / total
+    }
+
+    /// The sum of the weights, and the log of each one's share of it, put into a list.
+    pub(super) fn log_shares(weights: &[f64], mut into: Vec<f64>) -> (f64, Vec<f64>) {
+        let total: f64 = weights.iter().sum();
+        into.clear();
+        into.extend(weights.iter().map(|w| libm::log(*w) - libm::log(total)));
+        (total, into)
     }
 }
 
@@ -117,16 +150,16 @@ impl Distribution for Mixture {
     }
 
     fn log_density(&self, x: &Datum) -> f64 {
-        let score = self.total_score(&self.scores(x));
+        let score = Self::total(&self.log_shares, &self.scores(x));
         if score.is_nan() { f64::NEG_INFINITY } else { score }
     }
 
     fn gradient(&self, x: &Datum) -> Option<Gradient> {
         let shares = self.responsibilities(x)?;
         let scores = self.scores(x);
-        let all = self.total_score(&scores);
+        let all = Self::total(&self.log_shares, &scores);
         let dim = self.support.gradient_dim();
-        let by_weight = |s: &f64| (libm::exp(s - all).min(f64::MAX) - 1.0) / self.total;
+        let by_weight = |s: &f64| Self::by_weight(*s, all, self.total);
         let mut g = Gradient { x: vec![0.0; dim], params: scores.iter().map(by_weight).collect() };
         for (share, c) in shares.iter().zip(&self.components) {
             match c.gradient(x).filter(|_| *share > 0.0) {

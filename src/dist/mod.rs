@@ -4,6 +4,7 @@
 //! that is total: a log density is -inf off the support (a value of the wrong kind included) and never NaN.
 
 mod ascending;
+mod batch;
 mod beta;
 mod binomial;
 mod categorical;
@@ -31,6 +32,7 @@ mod inv_gamma;
 mod laplace;
 mod lkj;
 mod lognormal;
+mod mixed;
 mod mixture;
 mod multinomial;
 mod mv_normal;
@@ -53,6 +55,7 @@ mod von_mises;
 mod weibull;
 mod wishart;
 
+pub use batch::{Batch, batch};
 pub use beta::Beta;
 pub use binomial::Binomial;
 pub use categorical::Categorical;
@@ -76,6 +79,7 @@ pub use inv_gamma::InvGamma;
 pub use laplace::Laplace;
 pub use lkj::Lkj;
 pub use lognormal::LogNormal;
+pub use mixed::batch_of_mixture;
 pub use mixture::Mixture;
 pub use multinomial::Multinomial;
 pub use mv_normal::MvNormal;

@@ -20,6 +20,15 @@ impl Normal {
         let (mean, sd) = (finite(Self::NAME, "mean", mean)?, positive(Self::NAME, "sd", sd)?);
         Ok(Normal { mean, sd, log_norm: -libm::log(sd) - LN_SQRT_2PI })
     }
+
+    /// The same as [`Normal::new`]; the logarithm is not taken again if the deviation is that of `self`.
+    #[inline]
+    pub fn near(&self, mean: f64, sd: f64) -> Result<Normal, ParamError> {
+        if sd.to_bits() != self.sd.to_bits() {
+            return Normal::new(mean, sd);
+        }
+        Ok(Normal { mean: finite(Self::NAME, "mean", mean)?, ..*self })
+    }
 }
 
 impl Scalar for Normal {

@@ -72,6 +72,20 @@ impl Adjoint {
         }
     }
 
+    /// Multiplies all of it.
+    pub fn scale(&mut self, factor: f64) {
+        if factor == 1.0 {
+            return;
+        }
+        match self {
+            Adjoint::Num(g) => *g *= factor,
+            Adjoint::Array(gs) => gs.iter_mut().for_each(|g| *g *= factor),
+            Adjoint::List(all) => all.iter_mut().for_each(|a| a.scale(factor)),
+            Adjoint::Record(all) => all.iter_mut().for_each(|(_, a)| a.scale(factor)),
+            Adjoint::Zero | Adjoint::Unknown => {}
+        }
+    }
+
     /// Adds another of the same shape.
     pub fn add(&mut self, other: Adjoint) {
         match (&mut *self, other) {

@@ -144,6 +144,7 @@ impl Graph {
         if scores.iter().any(|(n, _)| matches!(self.nodes[*n as usize].side.as_deref(), Some(Side::Total(_)))) {
             return false;
         }
+        self.revision += 1;
         let score = dist.log_density_stored(value);
         self.prior.sub(self.nodes[target as usize].score);
         self.prior.add(score);

@@ -48,6 +48,8 @@ pub(crate) struct Graph {
     pub epoch: u32,
     /// Counts structural versions.
     pub version: u32,
+    /// Counts the updates that were kept.
+    pub revision: u64,
     /// Nodes being evaluated.
     pub stack: Vec<NodeId>,
     /// Effects of new frames, to be run.
@@ -74,7 +76,7 @@ pub(crate) struct Graph {
     /// The choices this update removed: node, address hash and stored value.
     pub removed: Vec<(NodeId, u64, Datum)>,
     /// The log Jacobians of choices set through the unconstrained space.
-    pub jacobian: f64,
+    pub jacobian: ExactSum,
     /// Choices that appeared and vanished in this update.
     pub appeared: u32,
     pub vanished: u32,
@@ -108,6 +110,7 @@ impl Graph {
             journal: Vec::new(),
             epoch: 1,
             version: 0,
+            revision: 0,
             stack: Vec::new(),
             effects: Vec::new(),
             stale_effects: Vec::new(),
@@ -122,7 +125,7 @@ impl Graph {
             drawn: ExactSum::default(),
             undrawn: ExactSum::default(),
             removed: Vec::new(),
-            jacobian: 0.0,
+            jacobian: ExactSum::default(),
             appeared: 0,
             vanished: 0,
             choices: Choices::default(),

@@ -80,7 +80,7 @@ impl Graph {
         };
         self.drawn = ExactSum::default();
         self.undrawn = ExactSum::default();
-        self.jacobian = 0.0;
+        self.jacobian = ExactSum::default();
         self.removed.clear();
         self.appeared = 0;
         self.vanished = 0;
@@ -106,6 +106,7 @@ impl Graph {
 
     /// Keeps the update.
     pub fn commit(&mut self, code: &Code) {
+        self.revision += 1;
         self.journal.clear();
         let detached = std::mem::take(&mut self.detached);
         for f in &detached {

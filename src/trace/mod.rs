@@ -34,6 +34,7 @@ use crate::dist::{Datum, Dist};
 use crate::lang::code::{Code, DistSpec, Op, Operand};
 use crate::lang::error::RunError;
 use crate::lang::value::{Likelihood, Located, Value};
+pub use gradient::Recording;
 use graph::Graph;
 use journal::Before;
 use node::{NONE, State};

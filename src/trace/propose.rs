@@ -120,7 +120,7 @@ impl Graph {
             log_weight,
             log_joint,
             log_likelihood: ExactSum::difference(&self.likelihood, likelihood),
-            log_jacobian: self.jacobian,
+            log_jacobian: self.jacobian.value(),
             appeared: self.appeared,
             vanished: self.vanished,
         }

@@ -4,6 +4,7 @@ use super::Args;
 use super::elementwise::{array_len, part};
 use crate::lang::adjoint::Adjoint;
 use crate::lang::value::Value;
+use crate::num::Column;
 use smallvec::{SmallVec, smallvec};
 
 /// The adjoints of a call's arguments, in order; those left out at the end are zero.
@@ -21,10 +22,128 @@ pub enum Derivative {
     Zero,
     /// Its vector-Jacobian product.
     Product(Pull),
+    /// That of a function of one number, element by element.
+    Unary(&'static Unary),
+    /// That of a function of two numbers, element by element.
+    Binary(&'static Binary),
+    /// That of a function of an array that gives one number.
+    Reduction(&'static Reduction),
+}
+
+/// A function of one number.
+#[derive(Debug)]
+pub struct Unary {
+    /// The function.
+    pub value: fn(f64) -> f64,
+    /// dy/dx, of x and y.
+    pub slope: fn(f64, f64) -> f64,
+}
+
+/// A function of two numbers, also in loops over numbers in a buffer (see [`binary_form`]).
+#[derive(Debug)]
+pub struct Binary {
+    /// dz/dx and dz/dy, of x, y and z.
+    pub slopes: fn(f64, f64, f64) -> [f64; 2],
+    /// Of a buffer, both arguments, where the results begin and how many there are: fills in the results.
+    pub forward: fn(&mut [f64], Column, Column, usize, usize),
+    /// Of a buffer, adjoints in the same places, and the rest as above: adds to the adjoints of the arguments.
+    pub reverse: fn(&[f64], &mut [f64], Column, Column, usize, usize),
+    /// The product where the result is an object.
+    pub objects: Option<Pull>,
+}
+
+/// A function of an array that gives one number.
+#[derive(Debug)]
+pub struct Reduction {
+    /// The function.
+    pub value: fn(&[f64]) -> f64,
+    /// Its partial derivatives, of the array and the result: one for each element.
+    pub slopes: fn(&[f64], f64, &mut [f64]),
+}
+
+impl Derivative {
+    /// The adjoints of the arguments of a call with this result.
+    pub fn pull(&self, a: &Args, value: &Value, by: &Adjoint) -> Option<Pulled> {
+        match (self, value) {
+            (Derivative::Unknown, _) => None,
+            (Derivative::Zero, _) => Some(Pulled::new()),
+            (Derivative::Product(f), _) => f(a, value, by),
+            (Derivative::Unary(f), _) => unary(a, value, by, f.slope),
+            (Derivative::Binary(f), Value::Object(_)) => f.objects.and_then(|pull| pull(a, value, by)),
+            (Derivative::Binary(f), _) => of_two(a, value, by, f.slopes),
+            (Derivative::Reduction(f), _) => reduction(a, value, by, f.slopes),
+        }
+    }
+}
+
+/// The form of a function of two numbers and its slopes: loops made for them, so that arithmetic runs over buffers without calls.
+macro_rules! binary_form {
+    ($f:expr, $slopes:expr) => {
+        binary_form!($f, $slopes, None)
+    };
+    ($f:expr, $slopes:expr, $objects:expr) => {
+        $crate::lang::builtins::derivative::Derivative::Binary(
+            &const {
+                $crate::lang::builtins::derivative::Binary {
+                    slopes: $slopes,
+                    forward: |v, x, y, out, n| $crate::lang::builtins::derivative::each_pair(v, x, y, out, n, $f),
+                    reverse: |v, g, x, y, out, n| {
+                        $crate::lang::builtins::derivative::pull_pairs(v, g, x, y, out, n, $slopes)
+                    },
+                    objects: $objects,
+                }
+            },
+        )
+    };
+}
+pub(super) use binary_form;
+
+/// Fills in the results of a function of two columns that lie before them in a buffer.
+#[inline(always)]
+pub(super) fn each_pair(v: &mut [f64], x: Column, y: Column, out: usize, n: usize, f: impl Fn(f64, f64) -> f64) {
+    let (before, z) = v.split_at_mut(out);
+    let z = &mut z[..n];
+    match (x.step, y.step) {
+        (0, 0) => z.fill(f(before[x.at], before[y.at])),
+        (0, _) => {
+            let x = before[x.at];
+            z.iter_mut().zip(&before[y.at..y.at + n]).for_each(|(z, y)| *z = f(x, *y));
+        }
+        (_, 0) => {
+            let y = before[y.at];
+            z.iter_mut().zip(&before[x.at..x.at + n]).for_each(|(z, x)| *z = f(*x, y));
+        }
+        _ => {
+            let both = before[x.at..x.at + n].iter().zip(&before[y.at..y.at + n]);
+            z.iter_mut().zip(both).for_each(|(z, (x, y))| *z = f(*x, *y));
+        }
+    }
+}
+
+/// Adds to the adjoints of both columns.
+#[inline(always)]
+pub(super) fn pull_pairs(
+    v: &[f64],
+    g: &mut [f64],
+    x: Column,
+    y: Column,
+    out: usize,
+    n: usize,
+    slopes: impl Fn(f64, f64, f64) -> [f64; 2],
+) {
+    let (before, by) = g.split_at_mut(out);
+    let (z, by) = (&v[out..out + n], &by[..n]);
+    for (side, c) in [x, y].into_iter().enumerate().filter(|(_, c)| c.live) {
+        let one = |i: usize| times(by[i], slopes(v[x.at + i * x.step], v[y.at + i * y.step], z[i])[side]);
+        match c.step {
+            0 => before[c.at] += (0..n).fold(0.0, |sum, i| sum + one(i)),
+            _ => before[c.at..c.at + n].iter_mut().enumerate().for_each(|(i, g)| *g += one(i)),
+        }
+    }
 }
 
 /// A product in which nothing stays nothing: an infinite slope of something that does not matter is 0.
-pub(super) fn times(by: f64, slope: f64) -> f64 {
+pub(crate) fn times(by: f64, slope: f64) -> f64 {
     if by == 0.0 { 0.0 } else { by * slope }
 }
 
@@ -38,7 +157,7 @@ fn number(v: &Value, i: usize) -> Option<f64> {
 }
 
 /// A function of one number, element by element: `slope(x, y)` is dy/dx.
-pub(super) fn unary(a: &Args, y: &Value, by: &Adjoint, slope: fn(f64, f64) -> f64) -> Option<Pulled> {
+fn unary(a: &Args, y: &Value, by: &Adjoint, slope: fn(f64, f64) -> f64) -> Option<Pulled> {
     fn go(x: &Value, y: &Value, by: &Adjoint, slope: fn(f64, f64) -> f64) -> Option<Adjoint> {
         Some(match (x, y, by) {
             (_, _, Adjoint::Zero) => Adjoint::Zero,
@@ -103,17 +222,19 @@ pub(super) fn binary(
 }
 
 /// The same for a call with two arguments.
-pub(super) fn of_two(a: &Args, z: &Value, by: &Adjoint, slopes: fn(f64, f64, f64) -> [f64; 2]) -> Option<Pulled> {
+fn of_two(a: &Args, z: &Value, by: &Adjoint, slopes: fn(f64, f64, f64) -> [f64; 2]) -> Option<Pulled> {
     binary(a.get(0), a.get(1), z, by, slopes).map(|both| both.into_iter().collect())
 }
 
-/// A function of an array that gives one number: `slopes(xs, y)` are its partial derivatives.
-pub(super) fn reduction(a: &Args, y: &Value, by: &Adjoint, slopes: fn(&[f64], f64) -> Vec<f64>) -> Option<Pulled> {
+/// A function of an array that gives one number.
+fn reduction(a: &Args, y: &Value, by: &Adjoint, slopes: fn(&[f64], f64, &mut [f64])) -> Option<Pulled> {
     let xs = a.numbers(0).ok()?;
     let Value::Num(y) = y else { return None };
     let g = by.number();
-    let all = slopes(&xs, *y);
-    Some(smallvec![Adjoint::Array(all.into_iter().map(|s| times(g, s)).collect())])
+    let mut all = vec![0.0; xs.len()];
+    slopes(&xs, *y, &mut all);
+    all.iter_mut().for_each(|s| *s = times(g, *s));
+    Some(smallvec![Adjoint::Array(all)])
 }
 
 /// A function of several numbers that gives one of them, element by element (`min`, `max`, `clamp`, `select`): the derivative

@@ -225,15 +225,21 @@ fn product<const N: usize>(
             _ => return Err(a.wrong(i, "a number or an array of numbers")),
         }
     }
-    let element = |k: usize| {
+    let n = first.map_or(0, |(_, n)| n);
+    let mut elements: Vec<Dist> = Vec::with_capacity(n);
+    for k in 0..n {
         for (p, column) in parameters.iter_mut().zip(&columns) {
             if let Some(xs) = column {
                 *p = xs[k];
             }
         }
-        make(parameters).map_err(|e| Fault::domain(format!("{e} (element {k})")))
-    };
-    let elements = (0..first.map_or(0, |(_, n)| n)).map(element).collect::<Result<Vec<_>, _>>()?;
+        let made = match (elements.last(), &parameters[..]) {
+            // All are of one family; a deviation that stays needs no other logarithm.
+            (Some(Dist::Normal(d)), [mean, sd]) => d.near(*mean, *sd).map(Dist::Normal),
+            _ => make(parameters),
+        };
+        elements.push(made.map_err(|e| Fault::domain(format!("{e} (element {k})")))?);
+    }
     dist::Product::new(elements).map(|d| Dist::Product(Arc::new(d))).map_err(fault)
 }
 

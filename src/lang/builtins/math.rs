@@ -1,9 +1,9 @@
 //! Functions of numbers, element by element on arrays, through libm so that they are the same on every platform.
 
-use super::derivative::{self, of_two, one_of};
+use super::derivative::{Unary, binary_form, one_of};
 use super::elementwise::{mapped, numeric};
 use super::reduce::{largest, smallest};
-use super::{Arg, Args, Builtin, Pulled, Scalar, Type, arg, function};
+use super::{Arg, Args, Builtin, Derivative, Pulled, Scalar, Type, arg, function};
 use crate::lang::adjoint::Adjoint;
 use crate::lang::error::Fault;
 use crate::lang::value::Value;
@@ -12,13 +12,16 @@ const SECTION: &str = "Math";
 
 const X: &[Arg] = &[arg("x", Type::Nums, "The argument.")];
 const ANGLE: &[Arg] = &[arg("x", Type::Nums, "An angle.").unit("radians")];
+const DEGREES: &[Arg] = &[arg("x", Type::Nums, "An angle.").unit("degrees")];
+/// A degree in radians.
+const DEGREE: f64 = std::f64::consts::PI / 180.0;
 
 /// The row of a function of one number with its slope, of x and y.
 macro_rules! smooth {
     ($name:literal, $args:ident, $doc:literal, $f:expr, $slope:expr) => {
         function($name, SECTION, $args, Type::Nums, $doc, mapped)
             .scalar(Scalar::Unary($f))
-            .pull(|a, y, by| derivative::unary(a, y, by, $slope))
+            .derivative(Derivative::Unary(&const { Unary { value: $f, slope: $slope } }))
     };
 }
 
@@ -42,7 +45,7 @@ pub(super) const TABLE: &[Builtin] = &[
         mapped,
     )
     .scalar(Scalar::Binary(libm::pow))
-    .pull(|a, z, by| of_two(a, z, by, pow_slopes)),
+    .derivative(binary_form!(libm::pow, pow_slopes)),
     smooth!("abs", X, "The absolute value.", f64::abs, |x, _| sign(x)),
     steps("sign", "-1, 0 or 1.", sign),
     steps("step", "0 below 0, 1 from 0 on.", step),
@@ -98,25 +101,14 @@ pub(super) const TABLE: &[Builtin] = &[
         mapped,
     )
     .scalar(Scalar::Binary(libm::atan2))
-    .pull(|a, z, by| {
-        of_two(a, z, by, |y, x, _| {
-            let square = x * x + y * y;
-            [x / square, -y / square]
-        })
-    }),
+    .derivative(binary_form!(libm::atan2, |y, x, _| {
+        let square = x * x + y * y;
+        [x / square, -y / square]
+    })),
     smooth!("sinh", X, "The hyperbolic sine.", libm::sinh, |x, _| libm::cosh(x)),
     smooth!("cosh", X, "The hyperbolic cosine.", libm::cosh, |x, _| libm::sinh(x)),
     smooth!("tanh", X, "The hyperbolic tangent.", libm::tanh, |_, y| 1.0 - y * y),
-    function(
-        "deg",
-        SECTION,
-        &[arg("x", Type::Nums, "An angle.").unit("degrees")],
-        Type::Nums,
-        "Degrees in radians: `deg(180)` is pi.",
-        mapped,
-    )
-    .scalar(Scalar::Unary(|x| x * (std::f64::consts::PI / 180.0)))
-    .pull(|a, y, by| derivative::unary(a, y, by, |_, _| std::f64::consts::PI / 180.0)),
+    smooth!("deg", DEGREES, "Degrees in radians: `deg(180)` is pi.", |x| x * DEGREE, |_, _| DEGREE),
     smooth!("logit", X, "`log(p / (1 - p))`, for probabilities.", logit, |x, _| 1.0 / (x * (1.0 - x))),
     smooth!("expit", X, "`1 / (1 + exp(-x))`, the inverse of `logit`.", expit, |_, y| y * (1.0 - y)),
     smooth!("erf", X, "The error function.", libm::erf, |x, _| std::f64::consts::FRAC_2_SQRT_PI * libm::exp(-x * x)),

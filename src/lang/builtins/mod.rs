@@ -23,7 +23,9 @@ mod table;
 
 pub use args::Args;
 pub use covariance::CovarianceValue;
-pub use derivative::{Derivative, Pull, Pulled};
+pub(crate) use derivative::times;
+pub use derivative::{Binary, Derivative, Pull, Pulled, Reduction, Unary};
+pub(crate) use reduce::dot;
 pub use table::{Constant, Table};
 
 use super::error::Fault;
@@ -247,9 +249,29 @@ impl Builtin {
         Builtin { derivative: Derivative::Product(f), ..self }
     }
 
+    /// The same with a derivative.
+    const fn derivative(self, derivative: Derivative) -> Builtin {
+        Builtin { derivative, ..self }
+    }
+
     /// The same, with a derivative of zero wherever there is one.
     const fn flat(self) -> Builtin {
         Builtin { derivative: Derivative::Zero, ..self }
+    }
+
+    /// Calls it with values, one for each argument.
+    ///
+    /// # Errors
+    /// What is wrong with them.
+    pub(crate) fn apply(&self, values: &[&Value]) -> Result<Value, Fault> {
+        let args = Args { builtin: self, values };
+        match self.kind {
+            Kind::Function(f) => f(&args),
+            Kind::Distribution(f) => f(&args).map(|d| Value::Dist(std::sync::Arc::new(d))),
+            Kind::Form(_) | Kind::Inference => {
+                Err(Fault::type_error(format!("`{}` cannot be used as a function value", self.name)))
+            }
+        }
     }
 
     /// Whether this version only checks and documents it, and cannot run it yet.

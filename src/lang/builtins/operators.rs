@@ -4,10 +4,10 @@
 
 use super::args::MAX_ELEMENTS;
 use super::covariance::CovarianceValue;
-use super::derivative::{self, of_two};
+use super::derivative::{Unary, binary_form};
 use super::elementwise::{self, array, array_len, broadcast, mapped, numeric};
 use super::math::pow_slopes;
-use super::{Arg, Args, Builtin, Scalar, Type, arg, function};
+use super::{Arg, Args, Builtin, Derivative, Scalar, Type, arg, function};
 use crate::lang::error::Fault;
 use crate::lang::value::Value;
 use std::cmp::Ordering;
@@ -20,18 +20,24 @@ const fn infix(name: &'static str, returns: Type, doc: &'static str, f: fn(&Args
     function(name, SECTION, SIDES, returns, doc, f)
 }
 
+/// The row of an operator on numbers with its slopes, of x, y and z.
+macro_rules! arithmetic {
+    ($name:literal, $doc:literal, $f:expr, $slopes:expr) => {
+        infix($name, Type::Nums, $doc, arithmetic).scalar(Scalar::Binary($f)).derivative(binary_form!($f, $slopes))
+    };
+}
+
 pub(super) const TABLE: &[Builtin] = &[
     infix("+", Type::Any, "Sum of numbers, element by element; joins two strings; adds covariances.", add)
         .scalar(Scalar::Binary(|x, y| x + y))
-        .pull(|a, z, by| match z {
-            Value::Object(_) => {
+        .derivative(binary_form!(
+            |x, y| x + y,
+            |_, _, _| [1.0, 1.0],
+            Some(|a, _, by| {
                 CovarianceValue::pull_both(a.get(0), a.get(1), by).map(|both| both.into_iter().collect())
-            }
-            _ => of_two(a, z, by, |_, _, _| [1.0, 1.0]),
-        }),
-    infix("-", Type::Nums, "Difference, element by element.", arithmetic)
-        .scalar(Scalar::Binary(|x, y| x - y))
-        .pull(|a, z, by| of_two(a, z, by, |_, _, _| [1.0, -1.0])),
+            })
+        )),
+    arithmetic!("-", "Difference, element by element.", |x, y| x - y, |_, _, _| [1.0, -1.0]),
     infix(
         "*",
         Type::Any,
@@ -39,19 +45,21 @@ pub(super) const TABLE: &[Builtin] = &[
         multiply,
     )
     .scalar(Scalar::Binary(|x, y| x * y))
-    .pull(|a, z, by| match (a.get(0), z) {
-        (Value::Object(o), Value::Object(_)) => o.pull_product(a.get(1), by).map(|both| both.into_iter().collect()),
-        _ => of_two(a, z, by, |x, y, _| [y, x]),
+    .derivative(binary_form!(
+        |x, y| x * y,
+        |x, y, _| [y, x],
+        Some(|a, _, by| match a.get(0) {
+            Value::Object(o) => o.pull_product(a.get(1), by).map(|both| both.into_iter().collect()),
+            _ => None,
+        })
+    )),
+    arithmetic!("/", "Quotient, element by element; by zero it is an infinity or NaN.", |x, y| x / y, |_, y, z| {
+        [1.0 / y, -z / y]
     }),
-    infix("/", Type::Nums, "Quotient, element by element; by zero it is an infinity or NaN.", arithmetic)
-        .scalar(Scalar::Binary(|x, y| x / y))
-        .pull(|a, z, by| of_two(a, z, by, |_, y, z| [1.0 / y, -z / y])),
-    infix("%", Type::Nums, "Remainder with the sign of the divisor: `-1 % 3` is 2.", arithmetic)
-        .scalar(Scalar::Binary(remainder))
-        .pull(|a, z, by| of_two(a, z, by, |x, y, _| [1.0, -libm::floor(x / y)])),
-    infix("**", Type::Nums, "Power, element by element.", arithmetic)
-        .scalar(Scalar::Binary(libm::pow))
-        .pull(|a, z, by| of_two(a, z, by, pow_slopes)),
+    arithmetic!("%", "Remainder with the sign of the divisor: `-1 % 3` is 2.", remainder, |x, y, _| {
+        [1.0, -libm::floor(x / y)]
+    }),
+    arithmetic!("**", "Power, element by element.", libm::pow, pow_slopes),
     function(
         "neg",
         SECTION,
@@ -61,7 +69,7 @@ pub(super) const TABLE: &[Builtin] = &[
         mapped,
     )
     .scalar(Scalar::Unary(|x| -x))
-    .pull(|a, y, by| derivative::unary(a, y, by, |_, _| -1.0)),
+    .derivative(Derivative::Unary(&Unary { value: |x| -x, slope: |_, _| -1.0 })),
     function(
         "not",
         SECTION,

@@ -1,10 +1,9 @@
 //! Functions that make one number, or one running array, of an array of numbers. Sums run from left to right.
 
-use super::derivative::{reduction, times};
+use super::derivative::{Reduction, times};
 use super::math::{larger, smaller};
-use super::{Arg, Args, Builtin, Pull, Type, arg, function};
+use super::{Arg, Builtin, Derivative, Type, arg, function};
 use crate::lang::adjoint::Adjoint;
-use crate::lang::error::Fault;
 use crate::lang::value::Value;
 use smallvec::smallvec;
 
@@ -13,59 +12,41 @@ const SECTION: &str = "Sums and statistics";
 const XS: &[Arg] = &[arg("xs", Type::Array, "Numbers; bools count 0 and 1.")];
 const PAIR: &[Arg] = &[arg("xs", Type::Array, "Numbers."), arg("ys", Type::Array, "As many numbers.")];
 
-const fn of_all(name: &'static str, doc: &'static str, f: fn(&Args) -> Result<Value, Fault>, pull: Pull) -> Builtin {
-    function(name, SECTION, XS, Type::Num, doc, f).pull(pull)
+/// The row of a function of at least so many numbers.
+macro_rules! of_all {
+    ($name:literal, $least:literal, $doc:literal, $f:expr, $slopes:expr) => {
+        function($name, SECTION, XS, Type::Num, $doc, |a| {
+            let f: fn(&[f64]) -> f64 = $f;
+            a.numbers_from(0, $least).map(|xs| Value::Num(f(&xs)))
+        })
+        .derivative(Derivative::Reduction(&const { Reduction { value: $f, slopes: $slopes } }))
+    };
 }
 
 pub(super) const TABLE: &[Builtin] = &[
-    of_all(
-        "sum",
-        "The sum; 0 of nothing.",
-        |a| a.numbers(0).map(|xs| Value::Num(sum(&xs))),
-        |a, y, by| reduction(a, y, by, |xs, _| vec![1.0; xs.len()]),
-    ),
-    of_all(
-        "prod",
-        "The product; 1 of nothing.",
-        |a| a.numbers(0).map(|xs| Value::Num(xs.iter().product())),
-        |a, _, by| {
-            let others =
-                |xs: &[f64], i: usize| xs.iter().enumerate().filter(|(j, _)| *j != i).map(|(_, x)| x).product();
-            let xs = a.numbers(0).ok()?;
-            let g = by.number();
-            Some(smallvec![Adjoint::Array((0..xs.len()).map(|i| times(g, others(&xs, i))).collect())])
-        },
-    ),
-    of_all(
-        "mean",
-        "The arithmetic mean of at least one number.",
-        |a| a.numbers_from(0, 1).map(|xs| Value::Num(mean(&xs))),
-        |a, y, by| reduction(a, y, by, |xs, _| vec![1.0 / xs.len() as f64; xs.len()]),
-    ),
-    of_all(
-        "var",
-        "The sample variance (divisor n - 1) of at least two numbers.",
-        |a| a.numbers_from(0, 2).map(|xs| Value::Num(variance(&xs))),
-        |a, y, by| reduction(a, y, by, |xs, _| spread_slopes(xs, 2.0)),
-    ),
-    of_all(
+    of_all!("sum", 0, "The sum; 0 of nothing.", sum, |_, _, by| by.fill(1.0)),
+    of_all!("prod", 0, "The product; 1 of nothing.", |xs| xs.iter().product(), |xs, _, by| {
+        let others = |i: usize| xs.iter().enumerate().filter(|(j, _)| *j != i).map(|(_, x)| x).product();
+        by.iter_mut().enumerate().for_each(|(i, by)| *by = others(i));
+    }),
+    of_all!("mean", 1, "The arithmetic mean of at least one number.", mean, |xs, _, by| by.fill(1.0 / xs.len() as f64)),
+    of_all!("var", 2, "The sample variance (divisor n - 1) of at least two numbers.", variance, |xs, _, by| {
+        spread_slopes(xs, 2.0, by)
+    }),
+    of_all!(
         "sd",
+        2,
         "The sample standard deviation (divisor n - 1) of at least two numbers.",
-        |a| a.numbers_from(0, 2).map(|xs| Value::Num(variance(&xs).sqrt())),
-        |a, y, by| reduction(a, y, by, |xs, y| spread_slopes(xs, 1.0 / y)),
+        |xs| variance(xs).sqrt(),
+        |xs, y, by| spread_slopes(xs, 1.0 / y, by)
     ),
-    of_all(
-        "norm",
-        "The Euclidean length.",
-        |a| a.numbers(0).map(|xs| Value::Num(norm(&xs))),
-        |a, y, by| reduction(a, y, by, |xs, y| xs.iter().map(|x| x / y).collect()),
-    ),
-    of_all(
-        "log_sum_exp",
-        "`log(sum(exp(xs)))` without overflow; -inf of nothing.",
-        |a| a.numbers(0).map(|xs| Value::Num(log_sum_exp(&xs))),
-        |a, y, by| reduction(a, y, by, |xs, y| xs.iter().map(|x| libm::exp(x - y)).collect()),
-    ),
+    of_all!("norm", 0, "The Euclidean length.", norm, |xs, y, by| {
+        by.iter_mut().zip(xs).for_each(|(by, x)| *by = x / y)
+    }),
+    of_all!("log_sum_exp", 0, "`log(sum(exp(xs)))` without overflow; -inf of nothing.", log_sum_exp, |xs, y, by| by
+        .iter_mut()
+        .zip(xs)
+        .for_each(|(by, x)| *by = libm::exp(x - y))),
     function("cumsum", SECTION, XS, Type::Array, "The running sums.", |a| {
         let mut total = 0.0;
         let running = |x: &f64| {
@@ -92,9 +73,9 @@ pub(super) const TABLE: &[Builtin] = &[
 ];
 
 /// `factor (x - mean) / (n - 1)`: the derivatives of the variance for a factor of 2.
-fn spread_slopes(xs: &[f64], factor: f64) -> Vec<f64> {
+fn spread_slopes(xs: &[f64], factor: f64, by: &mut [f64]) {
     let m = mean(xs);
-    xs.iter().map(|x| factor * (x - m) / (xs.len() as f64 - 1.0)).collect()
+    by.iter_mut().zip(xs).for_each(|(by, x)| *by = factor * (x - m) / (xs.len() as f64 - 1.0));
 }
 
 fn sum(xs: &[f64]) -> f64 {
@@ -112,7 +93,7 @@ fn variance(xs: &[f64]) -> f64 {
     xs.iter().fold(0.0, |s, x| s + (x - m) * (x - m)) / (xs.len() as f64 - 1.0)
 }
 
-pub(super) fn dot(xs: &[f64], ys: &[f64]) -> f64 {
+pub(crate) fn dot(xs: &[f64], ys: &[f64]) -> f64 {
     xs.iter().zip(ys).fold(0.0, |s, (x, y)| s + x * y)
 }
 

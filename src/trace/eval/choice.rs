@@ -283,7 +283,7 @@ impl Graph {
                     return Err(self.fail(code, n, FaultKind::Domain, message, None));
                 }
                 let (x, jacobian) = support.from_free(&y);
-                self.jacobian += jacobian;
+                self.jacobian.add(jacobian);
                 (Some(x), false)
             }
             Some(Change::White(z)) => {
@@ -345,7 +345,7 @@ impl Graph {
                     Change::Set(d) => Some(d.clone()),
                     Change::Free(y) => {
                         let (x, jacobian) = one.stored_support().from_free(y);
-                        self.jacobian += jacobian;
+                        self.jacobian.add(jacobian);
                         Some(x)
                     }
                     Change::Resample => Some(self.drawn_now(code, n, &one, element_hash(hash, i))?),

@@ -11,7 +11,7 @@ pub(crate) use observe::Score;
 use super::demand::{Failure, Step};
 use super::graph::Graph;
 use super::node::*;
-use crate::lang::builtins::{Args, Builtin, Kind};
+use crate::lang::builtins::Builtin;
 use crate::lang::code::{Code, Op, Operand};
 use crate::lang::error::{Fault, FaultKind};
 use crate::lang::value::{Closure, Value};
@@ -177,12 +177,5 @@ impl Graph {
 
 /// Calls a built-in with values.
 pub(crate) fn apply(builtin: &Builtin, values: &[&Value]) -> Result<Value, Fault> {
-    let args = Args { builtin, values };
-    match builtin.kind {
-        Kind::Function(f) => f(&args),
-        Kind::Distribution(f) => f(&args).map(|d| Value::Dist(std::sync::Arc::new(d))),
-        Kind::Form(_) | Kind::Inference => {
-            Err(Fault::type_error(format!("`{}` cannot be used as a function value", builtin.name)))
-        }
-    }
+    builtin.apply(values)
 }

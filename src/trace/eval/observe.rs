@@ -1,7 +1,8 @@
 //! Observations and factors: what conditions the trace.
 
-use crate::dist::{Datum, Dist};
 use crate::lang::code::{Code, DistSpec, Op, Operand};
+pub(crate) use crate::lang::density::Score;
+use crate::lang::density::{self, likelihood_score};
 use crate::lang::error::{Fault, FaultKind};
 use crate::lang::value::Value;
 use crate::num::ExactSum;
@@ -9,14 +10,6 @@ use crate::trace::demand::{Failure, Step};
 use crate::trace::graph::Graph;
 use crate::trace::journal::Entry;
 use crate::trace::node::*;
-
-/// The score of an observation.
-pub(crate) enum Score {
-    /// One term.
-    One(f64),
-    /// One an element.
-    Sum(ExactSum),
-}
 
 impl Graph {
     pub(super) fn evaluate_observe(
@@ -106,7 +99,7 @@ impl Graph {
             }
         }
         let dist = self.dist_of_values(code, n, spec, values)?;
-        score_value(&dist, observed).map_err(|f| self.fault(code, n, f))
+        density::score(&dist, observed).map_err(|f| self.fault(code, n, f))
     }
 
     /// The log density of an observation's coarse surrogate: never part of the joint.
@@ -124,7 +117,7 @@ impl Graph {
         };
         let score = match self.value(code, frame, *coarse) {
             v @ Value::Likelihood(_) => likelihood_score(v, observed),
-            Value::Dist(d) => score_value(d, observed).map(|s| match s {
+            Value::Dist(d) => density::score(d, observed).map(|s| match s {
                 Score::One(x) => x,
                 Score::Sum(s) => s.value(),
             }),
@@ -174,54 +167,4 @@ impl Graph {
             _ => from.sub(node.score),
         }
     }
-}
-
-fn likelihood_score(v: &Value, observed: &Value) -> Result<f64, Fault> {
-    let Value::Likelihood(l) = v else { return Err(Fault::type_error("not a likelihood")) };
-    let score = l.log_density(observed).map_err(Fault::type_error)?;
-    if score.is_nan() {
-        return Err(Fault::domain(format!("the likelihood `{}` is not a number here", l.name())));
-    }
-    Ok(score)
-}
-
-/// Scores a value, element by element where the distribution is over single numbers and the value is an array.
-fn score_value(dist: &Dist, observed: &Value) -> Result<Score, Fault> {
-    let wrong = || Fault::type_error(format!("`{}` cannot be observed to be {}", dist.name(), observed.type_name()));
-    if let Some(count) = dist.elements() {
-        if observed.len() != Some(count) {
-            let got = observed.len().map_or(observed.type_name().to_owned(), |l| format!("{l} values"));
-            return Err(Fault::type_error(format!("the distribution has {count} elements, but {got} are observed")));
-        }
-        return sum_scores(count, |i| {
-            let x = observed.element(i).as_ref().and_then(Value::to_datum).ok_or_else(wrong)?;
-            if matches!(x, Datum::Num(x) if x.is_nan()) {
-                return Err(Fault::domain(format!("element {i} of what is observed is not a number")));
-            }
-            Ok(dist.element_log_density(i, &x))
-        });
-    }
-    let nan = || Fault::domain("the observed value is not a number");
-    match observed {
-        Value::Num(x) if x.is_nan() => Err(nan()),
-        Value::Array(xs) if xs.iter().any(|x| x.is_nan()) => Err(nan()),
-        Value::Num(x) => Ok(Score::One(dist.log_density(&Datum::Num(*x)))),
-        Value::Bool(b) => Ok(Score::One(dist.log_density(&Datum::Bool(*b)))),
-        Value::Array(xs) if dist.is_scalar() => sum_scores(xs.len(), |i| Ok(dist.log_density(&Datum::Num(xs[i])))),
-        Value::List(_) if observed.to_datum().is_some_and(|x| dist.support().fits(&x)) => {
-            let x = observed.to_datum().ok_or_else(wrong)?;
-            Ok(Score::One(dist.log_density(&x)))
-        }
-        Value::List(xs) => sum_scores(xs.len(), |i| xs[i].to_datum().map(|x| dist.log_density(&x)).ok_or_else(wrong)),
-        Value::Array(xs) => Ok(Score::One(dist.log_density(&Datum::Vec(std::sync::Arc::clone(xs))))),
-        _ => Err(wrong()),
-    }
-}
-
-fn sum_scores(count: usize, mut score: impl FnMut(usize) -> Result<f64, Fault>) -> Result<Score, Fault> {
-    let mut sum = ExactSum::default();
-    for i in 0..count {
-        sum.add(score(i)?);
-    }
-    Ok(Score::Sum(sum))
 }

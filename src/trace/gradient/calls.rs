@@ -1,9 +1,10 @@
 //! How derivatives pass through calls of built-ins: written as such, called as values, mapped over elements.
 
-use super::{Reverse, scores};
+use super::Reverse;
 use crate::lang::adjoint::Adjoint;
-use crate::lang::builtins::{Args, Builtin, Derivative, Kind, Pulled};
+use crate::lang::builtins::{Args, Builtin, Kind, Pulled};
 use crate::lang::code::{Callee, Op, Operand};
+use crate::lang::density;
 use crate::lang::value::Value;
 use crate::trace::demand::Failure;
 use crate::trace::node::*;
@@ -77,11 +78,9 @@ impl Reverse<'_> {
         match (a.builtin.kind, a.builtin.derivative, value) {
             (Kind::Distribution(_), _, Value::Dist(d)) => {
                 let params = by.numbers(if let Adjoint::Array(gs) = by { gs.len() } else { 0 });
-                Ok(scores::by_arguments(a, d, &params))
+                Ok(density::by_arguments(a, d, &params))
             }
-            (_, Derivative::Zero, _) => Ok(Pulled::new()),
-            (_, Derivative::Product(f), value) => f(a, value, by).ok_or_else(unknown),
-            _ => Err(unknown()),
+            (_, derivative, value) => derivative.pull(a, value, by).ok_or_else(unknown),
         }
     }
 

@@ -7,7 +7,11 @@
 
 mod calls;
 mod pull;
+mod record;
+mod recording;
 mod scores;
+
+pub use recording::Recording;
 
 use super::choices::Target;
 use super::demand::Failure;

@@ -124,7 +124,7 @@ impl Reverse<'_> {
     }
 
     /// The alternative that a selection reads.
-    fn taken(&self, n: NodeId) -> Option<Operand> {
+    pub(super) fn taken(&self, n: NodeId) -> Option<Operand> {
         let Op::Select { then, otherwise, .. } = self.graph.op(self.code, n) else { return None };
         Some(if self.graph.nodes[n as usize].flags & OTHERWISE == 0 { *then } else { *otherwise })
     }
@@ -136,7 +136,7 @@ impl Reverse<'_> {
     }
 
     /// What a parameter of a pass gets: the node, and which of its elements unless all of it.
-    fn passed(&self, n: NodeId) -> Option<(NodeId, Option<usize>)> {
+    pub(super) fn passed(&self, n: NodeId) -> Option<(NodeId, Option<usize>)> {
         let g = self.graph;
         let f = &g.frames[g.nodes[n as usize].frame as usize];
         let slot = n - f.base;
@@ -164,7 +164,7 @@ impl Reverse<'_> {
     }
 
     /// Where an index ends up: the node whose plain value the last keys pick from, and those keys.
-    fn indexed(&self, n: NodeId) -> Option<(NodeId, SmallVec<[Value; 2]>)> {
+    pub(super) fn indexed(&self, n: NodeId) -> Option<(NodeId, SmallVec<[Value; 2]>)> {
         let g = self.graph;
         let frame = g.nodes[n as usize].frame;
         let Op::Index { base, keys } = g.op(self.code, n) else { return None };
@@ -190,26 +190,31 @@ impl Reverse<'_> {
     }
 
     fn pull_gather(&mut self, n: NodeId, by: &Adjoint) -> Result<(), Failure> {
-        let g = self.graph;
-        let Some(Side::Deps(deps)) = g.nodes[n as usize].side.as_deref() else { return Ok(()) };
-        let nested = deps.iter().filter(|d| matches!(g.nodes[**d as usize].value, Value::Container(_))).count();
-        let elements = &deps[..deps.len() - nested];
-        let value = &g.nodes[n as usize].value;
-        let count = match value {
-            Value::Record(r) => r.len(),
-            v => v.len().unwrap_or(0),
-        };
-        if elements.len() != count {
-            return Err(self.no_derivative(n, "what this map gives"));
+        if !matches!(self.graph.nodes[n as usize].side.as_deref(), Some(Side::Deps(_))) {
+            return Ok(());
         }
-        for (i, d) in elements.iter().enumerate() {
-            let part = match value {
+        let Some(elements) = self.gathered(n) else { return Err(self.no_derivative(n, "what this map gives")) };
+        for (i, d) in elements.into_iter().enumerate() {
+            let part = match &self.graph.nodes[n as usize].value {
                 Value::Record(r) => r.get_index(i).map_or(Adjoint::Zero, |(name, _)| by.field(name)),
                 _ => by.element(i),
             };
-            self.give_node(self.whole(*d), part);
+            self.give_node(d, part);
         }
         Ok(())
+    }
+
+    /// The nodes with the elements of a container read as a whole; `None` if some are constants.
+    pub(super) fn gathered(&self, n: NodeId) -> Option<Inputs> {
+        let g = self.graph;
+        let Some(Side::Deps(deps)) = g.nodes[n as usize].side.as_deref() else { return None };
+        let nested = deps.iter().filter(|d| matches!(g.nodes[**d as usize].value, Value::Container(_))).count();
+        let elements = &deps[..deps.len() - nested];
+        let count = match &g.nodes[n as usize].value {
+            Value::Record(r) => r.len(),
+            v => v.len().unwrap_or(0),
+        };
+        (elements.len() == count).then(|| elements.iter().map(|d| self.whole(*d)).collect())
     }
 
     /// A choice stored as white noise moves with its mean and covariance.

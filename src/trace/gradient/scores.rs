@@ -3,13 +3,12 @@
 use super::{Inputs, Reverse};
 use crate::dist::{Datum, Dist};
 use crate::lang::adjoint::Adjoint;
-use crate::lang::builtins::{Args, CovarianceValue};
+use crate::lang::builtins::Args;
 use crate::lang::code::{DistSpec, Op};
+use crate::lang::density;
 use crate::lang::value::Value;
-use crate::num::accumulate;
 use crate::trace::demand::Failure;
 use crate::trace::node::*;
-use smallvec::SmallVec;
 
 impl Reverse<'_> {
     /// The nodes that the score of a choice, observation or factor is computed from, but for the choice itself.
@@ -46,7 +45,7 @@ impl Reverse<'_> {
                     // Added where the noise's own derivative is made.
                     return Ok(());
                 }
-                let Some((by_x, params)) = of_value(&dist, &Value::from_datum(&stored)) else {
+                let Some((by_x, params)) = density::gradient(&dist, &Value::from_datum(&stored)) else {
                     return Err(self.no_derivative(n, &format!("the density of `{}`", dist.name())));
                 };
                 if own {
@@ -64,15 +63,15 @@ impl Reverse<'_> {
                     let Some(mut by) = l.gradient(observed) else {
                         return Err(self.no_derivative(n, &format!("the likelihood `{}`", l.name())));
                     };
-                    scale(&mut by, self.power);
+                    by.scale(self.power);
                     self.give(frame, *o, by);
                     return Ok(());
                 }
                 let dist = g.make_dist(code, n, frame, spec, &mut deps)?;
-                let Some((mut by_x, mut params)) = of_value(&dist, observed) else {
+                let Some((mut by_x, mut params)) = density::gradient(&dist, observed) else {
                     return Err(self.no_derivative(n, &format!("the density of `{}`", dist.name())));
                 };
-                scale(&mut by_x, self.power);
+                by_x.scale(self.power);
                 params.iter_mut().for_each(|p| *p *= self.power);
                 if g.replaced(code, n).is_none() {
                     self.give(frame, *value, by_x);
@@ -102,12 +101,11 @@ impl Reverse<'_> {
             DistSpec::Family { builtin, args } => {
                 let builtin = self.code.builtins.get(*builtin);
                 let values = self.values(frame, args);
-                let mut pulled = by_arguments(&Args { builtin, values: &values }, dist, &params);
-                pulled
-                    .iter_mut()
-                    .enumerate()
-                    .filter(|(i, _)| is_matrix(dist, *i))
-                    .for_each(|(_, p)| *p = Adjoint::Zero);
+                let a = Args { builtin, values: &values };
+                let mut pulled = density::by_arguments(&a, dist, &params);
+                if let Some(p) = density::matrix(&a, dist).and_then(|(i, _)| pulled.get_mut(i)) {
+                    *p = Adjoint::Zero;
+                }
                 self.give_arguments(n, builtin, args.iter().map(|o| Some(*o)), pulled)?;
             }
         }
@@ -115,15 +113,8 @@ impl Reverse<'_> {
     }
 }
 
-/// What [`Reverse::give_matrix`] is about: the argument with a covariance.
-enum Matrix {
-    Kernel,
-    Covariance,
-    Factor,
-}
-
 impl Reverse<'_> {
-    /// Hands the derivatives by a covariance, `weight` times, to what it was computed from; [`by_arguments`] leaves it out.
+    /// Hands the derivatives by a covariance, `weight` times, to what it was computed from; [`density::by_arguments`] leaves it out.
     pub(super) fn give_matrix(
         &mut self,
         n: NodeId,
@@ -136,145 +127,16 @@ impl Reverse<'_> {
         let DistSpec::Family { builtin, args } = spec else { return Ok(()) };
         let frame = self.graph.nodes[n as usize].frame;
         let values = self.values(frame, args);
-        let (i, which) = match (dist, values.get(1)) {
-            (Dist::Gp(_), _) => (1, Matrix::Kernel),
-            (Dist::MvNormal(_), Some(Value::Unit)) => (2, Matrix::Factor),
-            (Dist::MvNormal(_), _) => (1, Matrix::Covariance),
-            _ => return Ok(()),
-        };
+        let a = Args { builtin: self.code.builtins.get(*builtin), values: &values };
+        let Some((i, _)) = density::matrix(&a, dist) else { return Ok(()) };
         let Some(source) = args.get(i).and_then(|o| self.source(frame, *o)).filter(|s| self.is_active(*s)) else {
             return Ok(());
         };
-        let a = Args { builtin: self.code.builtins.get(*builtin), values: &values };
-        let found = match (dist, which) {
-            (Dist::Gp(d), _) => {
-                let cov = values.get(1).and_then(|v| v.downcast::<CovarianceValue>());
-                let at = a.array(2).ok();
-                let by = cov.zip(at).and_then(|(c, at)| d.covariance_gradient(&c.0, &at, stored, by_value));
-                by.map(Adjoint::Array)
-            }
-            (Dist::MvNormal(d), which) => {
-                let rows = d.matrix_gradient(matches!(which, Matrix::Factor), stored, by_value);
-                rows.map(|rows| Adjoint::List(rows.into_iter().map(Adjoint::Array).collect()))
-            }
-            _ => None,
-        };
-        let Some(mut by) = found else {
+        let Some(Some((_, mut by))) = density::by_matrix(&a, dist, stored, by_value) else {
             return Err(self.no_derivative(n, &format!("the covariance of `{}`", dist.name())));
         };
-        scale(&mut by, weight);
+        by.scale(weight);
         self.give_node(source, by);
         Ok(())
     }
-}
-
-fn scale(by: &mut Adjoint, power: f64) {
-    if power == 1.0 {
-        return;
-    }
-    match by {
-        Adjoint::Num(g) => *g *= power,
-        Adjoint::Array(gs) => gs.iter_mut().for_each(|g| *g *= power),
-        Adjoint::List(all) => all.iter_mut().for_each(|a| scale(a, power)),
-        Adjoint::Record(all) => all.iter_mut().for_each(|(_, a)| scale(a, power)),
-        Adjoint::Zero | Adjoint::Unknown => {}
-    }
-}
-
-/// The derivatives of the log density of a value: by the value, in its shape, and by the parameters. As scored, many values
-/// under a distribution of one number are independent.
-fn of_value(dist: &Dist, value: &Value) -> Option<(Adjoint, Vec<f64>)> {
-    if let (Value::Array(xs), true) = (value, dist.is_scalar()) {
-        let (mut by_x, mut params) = (Vec::with_capacity(xs.len()), Vec::new());
-        for x in xs.iter() {
-            let g = dist.gradient(&Datum::Num(*x))?;
-            by_x.push(g.x.first().copied().unwrap_or(0.0));
-            accumulate(&mut params, &g.params);
-        }
-        return Some((Adjoint::Array(by_x), params));
-    }
-    if let (Value::List(xs), None) = (value, dist.elements())
-        && !value.to_datum().is_some_and(|x| dist.support().fits(&x))
-    {
-        let (mut by_x, mut params) = (Vec::with_capacity(xs.len()), Vec::new());
-        for x in xs.iter() {
-            let (one, own) = of_value(dist, x)?;
-            by_x.push(one);
-            accumulate(&mut params, &own);
-        }
-        return Some((Adjoint::List(by_x), params));
-    }
-    let g = dist.gradient(&value.to_datum()?)?;
-    let mut rest = &g.x[..];
-    Some((shaped(value, &mut rest), g.params))
-}
-
-/// Numbers one after the other in the shape of a value; nothing by discrete parts.
-fn shaped(value: &Value, rest: &mut &[f64]) -> Adjoint {
-    match value {
-        Value::Num(_) => match rest.split_first() {
-            Some((g, after)) => {
-                *rest = after;
-                Adjoint::Num(*g)
-            }
-            None => Adjoint::Zero,
-        },
-        Value::Array(xs) if rest.len() >= xs.len() => {
-            let (own, after) = rest.split_at(xs.len());
-            *rest = after;
-            Adjoint::Array(own.to_vec())
-        }
-        Value::List(xs) => Adjoint::List(xs.iter().map(|x| shaped(x, rest)).collect()),
-        _ => Adjoint::Zero,
-    }
-}
-
-/// From the derivatives by a distribution's parameters to those by the arguments it was made from.
-pub(super) fn by_arguments(a: &Args, dist: &Dist, params: &[f64]) -> SmallVec<[Adjoint; 4]> {
-    let count = a.values.len();
-    // A product made of arrays: the parameters of each element in turn.
-    if let Dist::Product(p) = dist
-        && !p.is_empty()
-    {
-        let each = params.len() / p.len();
-        let column = |i: usize| params.chunks_exact(each.max(1)).map(move |c| c.get(i).copied().unwrap_or(0.0));
-        let one = |i: usize| match a.get(i) {
-            Value::Num(_) => Adjoint::Num(column(i).sum()),
-            Value::Array(_) => Adjoint::Array(column(i).collect()),
-            _ => Adjoint::Zero,
-        };
-        return (0..count).map(one).collect();
-    }
-    let mut rest = params;
-    let mut take = |n: usize| -> Option<Vec<f64>> {
-        let (own, after) = rest.split_at_checked(n)?;
-        rest = after;
-        Some(own.to_vec())
-    };
-    let one = |i: usize| -> Adjoint {
-        match a.get(i) {
-            _ if is_matrix(dist, i) => Adjoint::Unknown,
-            Value::Num(_) if dist.name() == "gp" => {
-                Adjoint::Num(take(params.len()).map_or(0.0, |all| all.iter().sum()))
-            }
-            Value::Num(_) => take(1).map_or(Adjoint::Zero, |g| Adjoint::Num(g[0])),
-            Value::Array(xs) => take(xs.len()).map_or(Adjoint::Unknown, Adjoint::Array),
-            Value::Dist(d) => take(d.param_count()).map_or(Adjoint::Unknown, Adjoint::Array),
-            Value::List(xs) => {
-                let parts = xs.iter().map(|x| match x {
-                    Value::Dist(d) => take(d.param_count()).map_or(Adjoint::Unknown, Adjoint::Array),
-                    _ => Adjoint::Unknown,
-                });
-                Adjoint::List(parts.collect())
-            }
-            Value::Unit | Value::Bool(_) | Value::Str(_) => Adjoint::Zero,
-            _ => Adjoint::Unknown,
-        }
-    };
-    (0..count).map(one).collect()
-}
-
-/// Whether an argument is a covariance, whose derivatives come by another way: [`Reverse::give_matrix`].
-fn is_matrix(dist: &Dist, i: usize) -> bool {
-    matches!((dist, i), (Dist::Gp(_), 1) | (Dist::MvNormal(_), 1 | 2))
 }

@@ -59,8 +59,8 @@ impl Adaptation {
 
     /// The step size to use now, found by trial when there is none yet.
     pub fn step(&mut self, system: &mut System, here: &Point, adapting: bool, rng: &mut Stream) -> TraceResult<f64> {
-        let signature = system.signature();
-        if signature != self.signature {
+        if system.signature() != self.signature {
+            let signature = system.signature().to_vec();
             // Other choices than before: what was learnt belongs to those that are still there.
             let mut old = std::collections::BTreeMap::new();
             let mut from = 0;
@@ -131,10 +131,10 @@ impl Adaptation {
         let mut step = if self.averaged > 0.0 { self.averaged } else { 0.5 / (system.dimensions() as f64).powf(0.25) };
         let mut direction = 0.0;
         for _ in 0..40 {
-            let p = system::draw(&self.inverse_mass, rng);
-            let start = system::kinetic(&p, &self.inverse_mass);
-            let ratio = match system.leapfrog(here, &p, step, &self.inverse_mass)? {
-                Some((to, q)) => to.log_density - here.log_density + start - system::kinetic(&q, &self.inverse_mass),
+            let from = system.launch(here, &self.inverse_mass, rng);
+            let start = system::kinetic(&from, &self.inverse_mass);
+            let ratio = match system.leapfrog(&from, step, &self.inverse_mass)? {
+                Some(to) => to.log_density - here.log_density + start - system::kinetic(&to, &self.inverse_mass),
                 None => f64::NEG_INFINITY,
             };
             let up = if ratio > libm::log(0.8) { 1.0 } else { -1.0 };

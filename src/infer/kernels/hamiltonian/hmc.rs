@@ -1,6 +1,6 @@
 //! `hmc(sel, steps)` and `mala(sel)`: trajectories of a fixed number of leapfrog steps (Neal 2011).
 
-use super::{Adaptation, DIVERGENT, System, system};
+use super::{Adaptation, DIVERGENT, Memory, System, system};
 use crate::infer::kernel::{At, Kernel, Outcome, Registered, Scope, accepts};
 use crate::trace::{Trace, TraceResult};
 
@@ -10,6 +10,7 @@ pub struct Hmc {
     scope: Registered,
     steps: u32,
     adaptation: Adaptation,
+    memory: Memory,
 }
 
 impl Hmc {
@@ -17,7 +18,8 @@ impl Hmc {
     pub fn new(scope: Scope, steps: u32, step: Option<f64>) -> Self {
         // The best acceptance of long trajectories, and of Langevin steps (Roberts & Rosenthal 1998, Beskos et al. 2013).
         let target = if steps == 1 { 0.574 } else { 0.8 };
-        Hmc { scope: Registered::new(scope), steps: steps.max(1), adaptation: Adaptation::new(target, step) }
+        let adaptation = Adaptation::new(target, step);
+        Hmc { scope: Registered::new(scope), steps: steps.max(1), adaptation, memory: Memory::default() }
     }
 }
 
@@ -29,18 +31,19 @@ impl Kernel for Hmc {
     fn step(&mut self, trace: &mut Trace, at: &At) -> TraceResult<Outcome> {
         let mut rng = at.stream();
         let (targets, _) = self.scope.members(trace, at, &mut rng);
-        let Some((mut system, here)) = System::begin(trace, at, &targets)? else { return Ok(Outcome::default()) };
+        let Some((mut system, here)) = System::begin(trace, at, &targets, &mut self.memory)? else {
+            return Ok(Outcome::default());
+        };
         let step = self.adaptation.step(&mut system, &here, at.adapting, &mut rng)?;
         // Of uneven length, so that no trajectory comes back to where it began again and again.
         let step = step * (0.9 + 0.2 * rng.uniform());
         let mass = &self.adaptation.inverse_mass;
-        let start = system::draw(mass, &mut rng);
-        let energy = system::kinetic(&start, mass);
-        let (mut point, mut p) = (here.clone(), start);
+        let mut point = system.launch(&here, mass, &mut rng);
+        let energy = system::kinetic(&point, mass);
         let mut there = true;
         for _ in 0..self.steps {
-            match system.leapfrog(&point, &p, step, mass)? {
-                Some((to, q)) => (point, p) = (to, q),
+            match system.leapfrog(&point, step, mass)? {
+                Some(to) => point = to,
                 None => {
                     there = false;
                     break;
@@ -48,12 +51,12 @@ impl Kernel for Hmc {
             }
         }
         let ratio = if there {
-            point.log_density - here.log_density + energy - system::kinetic(&p, mass)
+            point.log_density - here.log_density + energy - system::kinetic(&point, mass)
         } else {
             f64::NEG_INFINITY
         };
         let accepted = there && accepts(ratio, &mut rng);
-        let accepted = system.settle(accepted.then_some(&point))?;
+        let accepted = system.settle(accepted.then_some(&*point))?;
         if at.adapting {
             self.adaptation.learn(libm::exp(ratio.min(0.0)), if accepted { &point.y } else { &here.y });
         }

@@ -7,6 +7,7 @@
 
 mod adapt;
 mod hmc;
+mod memory;
 mod nuts;
 mod optimize;
 mod system;
@@ -16,7 +17,8 @@ pub use nuts::Nuts;
 pub use optimize::Optimize;
 
 use adapt::Adaptation;
-use system::{Momentum, Point, System};
+use memory::Memory;
+use system::{Point, System};
 
 /// By how much the energy may be off before a trajectory counts as divergent (Stan's bound).
 const DIVERGENT: f64 = 1000.0;

@@ -1,11 +1,12 @@
 //! `nuts(sel, max_depth)`: the No-U-Turn sampler (Hoffman & Gelman 2014) with multinomial sampling over the trajectory and the
 //! generalised stopping rule, checked across subtrees too (Betancourt 2017; as Stan has it).
 
-use super::{Adaptation, DIVERGENT, Momentum, Point, System, system};
+use super::{Adaptation, DIVERGENT, Memory, Point, System, system};
 use crate::infer::kernel::{At, Kernel, Outcome, Registered, Scope};
 use crate::num::log_sum_exp;
 use crate::rng::Stream;
 use crate::trace::{Trace, TraceResult};
+use std::sync::Arc;
 
 /// The No-U-Turn sampler.
 #[derive(Clone, Debug)]
@@ -13,31 +14,24 @@ pub struct Nuts {
     scope: Registered,
     max_depth: u32,
     adaptation: Adaptation,
+    memory: Memory,
 }
 
 impl Nuts {
     /// The kernel for these choices; a trajectory doubles at most `max_depth` times.
     pub fn new(scope: Scope, max_depth: u32) -> Self {
-        Nuts { scope: Registered::new(scope), max_depth, adaptation: Adaptation::new(0.8, None) }
+        let adaptation = Adaptation::new(0.8, None);
+        Nuts { scope: Registered::new(scope), max_depth, adaptation, memory: Memory::default() }
     }
-}
-
-/// An end of a trajectory.
-#[derive(Clone, Debug)]
-struct End {
-    point: Point,
-    momentum: Momentum,
-    /// The momentum times the inverse mass.
-    velocity: Vec<f64>,
 }
 
 /// A stretch of a trajectory, in the order in which it was made.
 struct Tree {
-    first: End,
-    last: End,
+    first: Arc<Point>,
+    last: Arc<Point>,
     /// The sum of the momenta.
-    sum: Momentum,
-    proposal: Point,
+    sum: Arc<Vec<f64>>,
+    proposal: Arc<Point>,
     log_weight: f64,
     /// Whether it turns back on itself, or diverges.
     stop: bool,
@@ -57,13 +51,14 @@ struct Walk<'s, 'a> {
 }
 
 impl Walk<'_, '_> {
-    fn end(&self, point: Point, momentum: Momentum) -> End {
-        let velocity = momentum.iter().zip(self.mass).map(|(p, m)| p * m).collect();
-        End { point, momentum, velocity }
+    /// A tree of one place.
+    fn leaf(&mut self, point: Arc<Point>, log_weight: f64) -> Tree {
+        let sum = self.system.numbers(point.momentum.iter().copied());
+        Tree { first: Arc::clone(&point), last: Arc::clone(&point), sum, proposal: point, log_weight, stop: false }
     }
 
     /// A tree of 2^depth leaps from an end; `None` when the very first leaves the space.
-    fn grow(&mut self, depth: u32, from: &End) -> TraceResult<Option<Tree>> {
+    fn grow(&mut self, depth: u32, from: &Point) -> TraceResult<Option<Tree>> {
         if depth == 0 {
             return self.leap(from);
         }
@@ -74,50 +69,39 @@ impl Walk<'_, '_> {
         let Some(outer) = self.grow(depth - 1, &inner.last)? else { return Ok(None) };
         let log_weight = log_sum_exp(&[inner.log_weight, outer.log_weight]);
         let take = self.rng.uniform() < libm::exp(outer.log_weight - log_weight);
-        let proposal = if take { outer.proposal.clone() } else { inner.proposal.clone() };
-        Ok(Some(join(inner, outer, proposal, log_weight)))
+        let proposal = Arc::clone(if take { &outer.proposal } else { &inner.proposal });
+        Ok(Some(self.join(inner, outer, proposal, log_weight)))
     }
 
-    fn leap(&mut self, from: &End) -> TraceResult<Option<Tree>> {
+    fn leap(&mut self, from: &Point) -> TraceResult<Option<Tree>> {
         self.leaps += 1.0;
-        let Some((point, momentum)) = self.system.leapfrog(&from.point, &from.momentum, self.step, self.mass)? else {
+        let Some(point) = self.system.leapfrog(from, self.step, self.mass)? else {
             self.divergent = true;
             return Ok(None);
         };
-        let log_weight = self.energy - (system::kinetic(&momentum, self.mass) - point.log_density);
+        let log_weight = self.energy - (system::kinetic(&point, self.mass) - point.log_density);
         self.acceptance += libm::exp(log_weight.min(0.0));
         if log_weight.is_nan() || log_weight <= -DIVERGENT {
             self.divergent = true;
             return Ok(None);
         }
-        let end = self.end(point, momentum);
-        Ok(Some(Tree {
-            sum: end.momentum.clone(),
-            proposal: end.point.clone(),
-            log_weight,
-            stop: false,
-            first: end.clone(),
-            last: end,
-        }))
+        Ok(Some(self.leaf(point, log_weight)))
+    }
+
+    /// Two stretches, the second made after the first, in the same direction of time.
+    fn join(&mut self, inner: Tree, outer: Tree, proposal: Arc<Point>, log_weight: f64) -> Tree {
+        let turns = turning(&inner.first, &outer.last, &inner.sum, &outer.sum)
+            || turning(&inner.first, &outer.first, &inner.sum, &outer.first.momentum)
+            || turning(&inner.last, &outer.last, &outer.sum, &inner.last.momentum);
+        let sum = self.system.numbers(inner.sum.iter().zip(outer.sum.iter()).map(|(a, b)| a + b));
+        let stop = inner.stop || outer.stop || turns;
+        Tree { stop, first: inner.first, last: outer.last, sum, proposal, log_weight }
     }
 }
 
-/// Two stretches, the second made after the first, in the same direction of time.
-fn join(inner: Tree, outer: Tree, proposal: Point, log_weight: f64) -> Tree {
-    let sum = plus(&inner.sum, &outer.sum);
-    let turns = turning(&inner.first, &outer.last, &sum)
-        || turning(&inner.first, &outer.first, &plus(&inner.sum, &outer.first.momentum))
-        || turning(&inner.last, &outer.last, &plus(&outer.sum, &inner.last.momentum));
-    Tree { stop: inner.stop || outer.stop || turns, first: inner.first, last: outer.last, sum, proposal, log_weight }
-}
-
-fn plus(a: &[f64], b: &[f64]) -> Vec<f64> {
-    a.iter().zip(b).map(|(a, b)| a + b).collect()
-}
-
-/// Whether one end no longer moves along the way.
-fn turning(a: &End, b: &End, sum: &[f64]) -> bool {
-    let along = |v: &[f64]| v.iter().zip(sum).map(|(v, s)| v * s).sum::<f64>();
+/// Whether one end no longer moves along the way, whose momenta sum up to two sums together.
+fn turning(a: &Point, b: &Point, some: &[f64], more: &[f64]) -> bool {
+    let along = |v: &[f64]| v.iter().zip(some.iter().zip(more)).map(|(v, (s, t))| v * (s + t)).sum::<f64>();
     // Also of NaN.
     !(along(&a.velocity) > 0.0 && along(&b.velocity) > 0.0)
 }
@@ -136,14 +120,16 @@ impl Kernel for Nuts {
     fn step(&mut self, trace: &mut Trace, at: &At) -> TraceResult<Outcome> {
         let mut rng = at.stream();
         let (targets, _) = self.scope.members(trace, at, &mut rng);
-        let Some((mut system, here)) = System::begin(trace, at, &targets)? else { return Ok(Outcome::default()) };
+        let Some((mut system, here)) = System::begin(trace, at, &targets, &mut self.memory)? else {
+            return Ok(Outcome::default());
+        };
         let step = self.adaptation.step(&mut system, &here, at.adapting, &mut rng)?;
-        let mass = self.adaptation.inverse_mass.clone();
-        let momentum = system::draw(&mass, &mut rng);
-        let energy = system::kinetic(&momentum, &mass) - here.log_density;
+        let mass = &self.adaptation.inverse_mass;
+        let start = system.launch(&here, mass, &mut rng);
+        let energy = system::kinetic(&start, mass) - here.log_density;
         let mut walk = Walk {
             system: &mut system,
-            mass: &mass,
+            mass,
             step,
             energy,
             acceptance: 0.0,
@@ -151,21 +137,13 @@ impl Kernel for Nuts {
             divergent: false,
             rng: &mut rng,
         };
-        let end = walk.end(here.clone(), momentum);
         // In the order of time: `first` is the past.
-        let mut tree = Tree {
-            sum: end.momentum.clone(),
-            proposal: here.clone(),
-            log_weight: 0.0,
-            stop: false,
-            first: end.clone(),
-            last: end,
-        };
+        let mut tree = walk.leaf(start, 0.0);
         let mut moved = false;
         for depth in 0..self.max_depth {
             let forward = walk.rng.uniform() < 0.5;
             walk.step = if forward { step } else { -step };
-            let from = if forward { tree.last.clone() } else { tree.first.clone() };
+            let from = Arc::clone(if forward { &tree.last } else { &tree.first });
             let Some(new) = walk.grow(depth, &from)? else { break };
             if new.stop {
                 break;
@@ -173,20 +151,20 @@ impl Kernel for Nuts {
             // Biased towards the new half, which keeps the target (Betancourt 2017, A.3.2).
             let take = walk.rng.uniform() < libm::exp(new.log_weight - tree.log_weight);
             let log_weight = log_sum_exp(&[tree.log_weight, new.log_weight]);
-            let proposal = if take { new.proposal.clone() } else { tree.proposal.clone() };
+            let proposal = Arc::clone(if take { &new.proposal } else { &tree.proposal });
             moved |= take;
             tree = if forward {
-                join(tree, new, proposal, log_weight)
+                walk.join(tree, new, proposal, log_weight)
             } else {
                 // Both as seen by someone going back in time, and turned round again.
-                reversed(join(reversed(tree), new, proposal, log_weight))
+                reversed(walk.join(reversed(tree), new, proposal, log_weight))
             };
             if tree.stop {
                 break;
             }
         }
         let (acceptance, divergent) = (walk.acceptance / walk.leaps.max(1.0), walk.divergent);
-        let moved = system.settle(moved.then_some(&tree.proposal))?;
+        let moved = system.settle(moved.then_some(&*tree.proposal))?;
         if at.adapting {
             self.adaptation.learn(acceptance, if moved { &tree.proposal.y } else { &here.y });
         }

@@ -3,10 +3,11 @@
 //! Not a sampler: for a start, or an answer in a hurry. The mode is that of the density in the unconstrained space, where the
 //! other kernels of this family move.
 
-use super::{Point, System};
+use super::{Memory, Point, System};
 use crate::infer::kernel::{At, Kernel, Outcome, Registered, Scope};
 use crate::trace::{Trace, TraceResult};
 use std::collections::VecDeque;
+use std::sync::Arc;
 
 /// How many of the last steps the curvature is taken from.
 const MEMORY: usize = 8;
@@ -16,6 +17,7 @@ const MEMORY: usize = 8;
 pub struct Optimize {
     scope: Registered,
     steps: u32,
+    memory: Memory,
 }
 
 /// A step and the change of the gradient over it.
@@ -27,7 +29,7 @@ struct Pair {
 impl Optimize {
     /// The kernel for these choices, with at most so many steps.
     pub fn new(scope: Scope, steps: u32) -> Self {
-        Optimize { scope: Registered::new(scope), steps }
+        Optimize { scope: Registered::new(scope), steps, memory: Memory::default() }
     }
 }
 
@@ -59,12 +61,11 @@ fn direction(gradient: &[f64], past: &VecDeque<Pair>) -> Vec<f64> {
 }
 
 /// A point up along a direction that gains enough (Armijo's rule), trying ever shorter steps.
-fn climb(system: &mut System, from: &Point, along: &[f64]) -> TraceResult<Option<Point>> {
+fn climb(system: &mut System, from: &Point, along: &[f64]) -> TraceResult<Option<Arc<Point>>> {
     let slope = dot(along, &from.gradient);
     let mut step = 1.0;
     for _ in 0..40 {
-        let y = from.y.iter().zip(along).map(|(y, d)| y + step * d).collect();
-        if let Some(to) = system.go(y, true)?
+        if let Some(to) = system.go(from.y.iter().zip(along).map(|(y, d)| y + step * d))?
             && to.log_density >= from.log_density + 1e-4 * step * slope
         {
             return Ok(Some(to));
@@ -82,8 +83,10 @@ impl Kernel for Optimize {
     fn step(&mut self, trace: &mut Trace, at: &At) -> TraceResult<Outcome> {
         let mut rng = at.stream();
         let (targets, _) = self.scope.members(trace, at, &mut rng);
-        let Some((mut system, begun)) = System::begin(trace, at, &targets)? else { return Ok(Outcome::default()) };
-        let mut here = begun.clone();
+        let Some((mut system, begun)) = System::begin(trace, at, &targets, &mut self.memory)? else {
+            return Ok(Outcome::default());
+        };
+        let mut here = Arc::clone(&begun);
         let mut past: VecDeque<Pair> = VecDeque::new();
         for _ in 0..self.steps {
             let mut along = direction(&here.gradient, &past);

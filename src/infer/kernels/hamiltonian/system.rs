@@ -1,29 +1,35 @@
 //! The dynamical system behind a trace: positions, densities and forces, and leapfrog steps.
+//!
+//! Densities and forces come from a tape of the trace where there is one (see [`super::memory`]), else from pending proposals and
+//! reverse passes through the trace: the same densities to the last bit. What a transition ends with is a proposal either way.
 
+use super::memory::{Layout, Memory};
 use crate::infer::kernel::{At, recoverable};
+use crate::num::ExactSum;
 use crate::rng::Stream;
-use crate::trace::{Change, Target, Trace, TraceResult};
-use std::ops::Range;
+use crate::trace::{Target, Trace, TraceResult};
+use std::sync::Arc;
 
-/// A place with its log density and force.
+/// A place with its log density and force, and how it is passed through.
 #[derive(Clone, Debug, Default)]
 pub(super) struct Point {
     pub y: Vec<f64>,
     pub gradient: Vec<f64>,
+    pub momentum: Vec<f64>,
+    /// The momentum times the inverse mass.
+    pub velocity: Vec<f64>,
     /// The log density in the unconstrained space, less that of the state the trace is in.
     pub log_density: f64,
 }
-
-/// The momentum, by coordinate.
-pub(super) type Momentum = Vec<f64>;
 
 /// A trace as a system; proposals are pending until [`System::settle`].
 pub(super) struct System<'a> {
     trace: &'a mut Trace,
     at: &'a At,
-    targets: Vec<Target>,
-    /// By target: where its coordinates are.
-    ranges: Vec<Range<usize>>,
+    memory: &'a mut Memory,
+    layout: Arc<Layout>,
+    /// Whether the memory has a tape of the state the trace is in.
+    taped: bool,
     jacobian: f64,
 }
 
@@ -32,109 +38,163 @@ impl<'a> System<'a> {
     ///
     /// # Errors
     /// An operation that has no derivative.
-    pub fn begin(trace: &'a mut Trace, at: &'a At, all: &[Target]) -> TraceResult<Option<(Self, Point)>> {
+    pub fn begin(
+        trace: &'a mut Trace,
+        at: &'a At,
+        all: &[Target],
+        memory: &'a mut Memory,
+    ) -> TraceResult<Option<(Self, Arc<Point>)>> {
         trace.rollback();
-        let mut system = System {
-            trace,
-            at,
-            targets: Vec::with_capacity(all.len()),
-            ranges: Vec::with_capacity(all.len()),
-            jacobian: 0.0,
-        };
-        let mut y = Vec::with_capacity(all.len());
-        for t in all {
-            let Some((own, jacobian)) = system.trace.free(*t).filter(|(own, _)| !own.is_empty()) else { continue };
-            system.targets.push(*t);
-            system.ranges.push(y.len()..y.len() + own.len());
-            system.jacobian += jacobian;
-            y.extend(own);
+        let mut here = memory.point();
+        let Some(point) = Arc::get_mut(&mut here) else { return Ok(None) };
+        point.log_density = 0.0;
+        if let Some(layout) = memory.stand(trace, all, &mut point.y)
+            && memory.gradient(&point.y, at.power, &mut point.gradient)
+        {
+            let jacobian = memory.log_jacobian();
+            let system = System { trace, at, layout, memory, taped: true, jacobian };
+            return Ok(system.usable(here));
         }
-        if y.is_empty() {
+        let mut jacobian = ExactSum::default();
+        let mut layout = Layout::new(all);
+        point.y.clear();
+        for t in all {
+            let Some((own, j)) = trace.free(*t).filter(|(own, _)| !own.is_empty()) else { continue };
+            layout.add(trace, *t, own.len());
+            jacobian.add(j);
+            point.y.extend(own);
+        }
+        if point.y.is_empty() {
             return Ok(None);
         }
-        let mut point = Point { y, gradient: Vec::new(), log_density: 0.0 };
-        system.force(&mut point)?;
-        let usable = point.gradient.iter().all(|g| g.is_finite());
-        Ok(usable.then_some((system, point)))
+        let layout = Arc::new(layout);
+        let taped =
+            memory.record(trace, &layout, &mut point.y) && memory.gradient(&point.y, at.power, &mut point.gradient);
+        let mut system = System { trace, at, memory, layout, taped, jacobian: jacobian.value() };
+        if !taped {
+            system.memory.give_up();
+            system.force(point)?;
+        }
+        Ok(system.usable(here))
+    }
+
+    fn usable(self, here: Arc<Point>) -> Option<(Self, Arc<Point>)> {
+        let finite = here.gradient.iter().all(|g| g.is_finite());
+        self.memory.keep(&here);
+        finite.then_some((self, here))
     }
 
     pub fn dimensions(&self) -> usize {
-        self.ranges.last().map_or(0, |r| r.end)
+        self.layout.dimensions()
     }
 
     /// The addresses of the choices, and how many coordinates each has: what a metric belongs to.
-    pub fn signature(&self) -> Vec<(u64, usize)> {
-        self.targets.iter().zip(&self.ranges).map(|(t, r)| (self.trace.address_hash(*t), r.len())).collect()
+    pub fn signature(&self) -> &[(u64, usize)] {
+        &self.layout.signature
     }
 
     fn force(&mut self, point: &mut Point) -> TraceResult<()> {
         point.gradient.clear();
-        self.trace.gradient(&self.targets, self.at.power, &mut point.gradient)
+        self.trace.gradient(&self.layout.targets, self.at.power, &mut point.gradient)
     }
 
-    /// Goes to a place: its log density, and with `force` its gradient. `None` where there is none.
-    pub fn go(&mut self, y: Vec<f64>, force: bool) -> TraceResult<Option<Point>> {
-        if y.iter().any(|x| !x.is_finite()) {
-            return Ok(None);
+    /// The log density and force at a place that was filled in. False where there is none.
+    fn evaluate(&mut self, point: &mut Point) -> TraceResult<bool> {
+        if point.y.iter().any(|x| !x.is_finite()) {
+            return Ok(false);
         }
-        let parts = self.ranges.iter().map(|r| y[r.clone()].to_vec());
-        let changes: Vec<(Target, Change)> = self.targets.iter().copied().zip(parts.map(Change::Free)).collect();
-        let Some(w) = recoverable(self.trace.propose(&changes, self.at.draws(0)))? else { return Ok(None) };
-        let log_density = self.at.tempered(&w) + w.log_jacobian - self.jacobian;
-        if w.appeared + w.vanished > 0 || !log_density.is_finite() {
-            return Ok(None);
-        }
-        let mut point = Point { y, gradient: Vec::new(), log_density };
-        if force {
-            self.force(&mut point)?;
-            if point.gradient.iter().any(|g| !g.is_finite()) {
-                return Ok(None);
+        if self.taped
+            && let Some(w) = self.memory.weigh(&point.y)
+        {
+            point.log_density = self.at.tempered(&w) + w.log_jacobian - self.jacobian;
+            if !point.log_density.is_finite() {
+                return Ok(false);
+            }
+            if self.memory.gradient(&point.y, self.at.power, &mut point.gradient) {
+                return Ok(point.gradient.iter().all(|g| g.is_finite()));
             }
         }
-        Ok(Some(point))
+        let Some(log_density) = self.propose(&point.y, false)? else { return Ok(false) };
+        point.log_density = log_density;
+        self.force(point)?;
+        Ok(point.gradient.iter().all(|g| g.is_finite()))
+    }
+
+    /// Proposes a place: its log density, `None` where there is none.
+    fn propose(&mut self, y: &[f64], as_values: bool) -> TraceResult<Option<f64>> {
+        let changes = self.memory.changes(y, as_values, &self.layout);
+        let Some(w) = recoverable(self.trace.propose(changes, self.at.draws(0)))? else { return Ok(None) };
+        let log_density = self.at.tempered(&w) + w.log_jacobian - self.jacobian;
+        Ok((w.appeared + w.vanished == 0 && log_density.is_finite()).then_some(log_density))
+    }
+
+    /// The log density and force at a place. `None` where there is none.
+    pub fn go(&mut self, y: impl Iterator<Item = f64>) -> TraceResult<Option<Arc<Point>>> {
+        let mut shared = self.memory.point();
+        let Some(point) = Arc::get_mut(&mut shared) else { return Ok(None) };
+        point.y.clear();
+        point.y.extend(y);
+        let there = self.evaluate(point)?;
+        self.memory.keep(&shared);
+        Ok(there.then_some(shared))
     }
 
     /// One leapfrog step with these inverse masses.
-    pub fn leapfrog(
-        &mut self,
-        from: &Point,
-        momentum: &Momentum,
-        step: f64,
-        inverse_mass: &[f64],
-    ) -> TraceResult<Option<(Point, Momentum)>> {
-        let mut p: Momentum = momentum.iter().zip(&from.gradient).map(|(p, g)| p + 0.5 * step * g).collect();
-        let y = from.y.iter().zip(&p).zip(inverse_mass).map(|((y, p), m)| y + step * m * p).collect();
-        let Some(to) = self.go(y, true)? else { return Ok(None) };
-        p.iter_mut().zip(&to.gradient).for_each(|(p, g)| *p += 0.5 * step * g);
-        Ok(Some((to, p)))
+    pub fn leapfrog(&mut self, from: &Point, step: f64, inverse_mass: &[f64]) -> TraceResult<Option<Arc<Point>>> {
+        let mut shared = self.memory.point();
+        let Some(to) = Arc::get_mut(&mut shared) else { return Ok(None) };
+        to.momentum.clear();
+        to.momentum.extend(from.momentum.iter().zip(&from.gradient).map(|(p, g)| p + 0.5 * step * g));
+        to.y.clear();
+        to.y.extend(from.y.iter().zip(&to.momentum).zip(inverse_mass).map(|((y, p), m)| y + step * m * p));
+        let there = self.evaluate(to)?;
+        to.momentum.iter_mut().zip(&to.gradient).for_each(|(p, g)| *p += 0.5 * step * g);
+        to.velocity.clear();
+        to.velocity.extend(to.momentum.iter().zip(inverse_mass).map(|(p, m)| p * m));
+        self.memory.keep(&shared);
+        Ok(there.then_some(shared))
+    }
+
+    /// The same place with a momentum drawn for these inverse masses.
+    pub fn launch(&mut self, here: &Point, inverse_mass: &[f64], rng: &mut Stream) -> Arc<Point> {
+        let mut shared = self.memory.point();
+        if let Some(point) = Arc::get_mut(&mut shared) {
+            point.y.clone_from(&here.y);
+            point.gradient.clone_from(&here.gradient);
+            point.log_density = here.log_density;
+            point.momentum.clear();
+            point.momentum.extend(inverse_mass.iter().map(|m| rng.standard_normal() / m.sqrt()));
+            point.velocity.clear();
+            point.velocity.extend(point.momentum.iter().zip(inverse_mass).map(|(p, m)| p * m));
+        }
+        self.memory.keep(&shared);
+        shared
+    }
+
+    /// A list of numbers to fill in.
+    pub fn numbers(&mut self, from: impl Iterator<Item = f64>) -> Arc<Vec<f64>> {
+        self.memory.numbers(from)
     }
 
     /// Makes a place the state of the trace, or leaves it where it was.
     pub fn settle(mut self, to: Option<&Point>) -> TraceResult<bool> {
-        match to {
-            Some(point) => {
-                let there = self.go(point.y.clone(), false)?.is_some();
-                if there {
-                    self.trace.commit()
-                } else {
-                    self.trace.rollback()
-                }
-                Ok(there)
-            }
-            None => {
-                self.trace.rollback();
-                Ok(false)
-            }
+        let Some(point) = to else {
+            self.trace.rollback();
+            return Ok(false);
+        };
+        // The Jacobian does not matter any more, whether there is a density does.
+        let there = self.propose(&point.y, self.taped)?.is_some();
+        if there {
+            self.trace.commit();
+            self.memory.moved(self.trace);
+        } else {
+            self.trace.rollback();
         }
+        Ok(there)
     }
 }
 
-/// A momentum drawn for these inverse masses.
-pub(super) fn draw(inverse_mass: &[f64], rng: &mut Stream) -> Momentum {
-    inverse_mass.iter().map(|m| rng.standard_normal() / m.sqrt()).collect()
-}
-
 /// The kinetic energy.
-pub(super) fn kinetic(momentum: &Momentum, inverse_mass: &[f64]) -> f64 {
-    0.5 * momentum.iter().zip(inverse_mass).map(|(p, m)| p * p * m).sum::<f64>()
+pub(super) fn kinetic(at: &Point, inverse_mass: &[f64]) -> f64 {
+    0.5 * at.momentum.iter().zip(inverse_mass).map(|(p, m)| p * p * m).sum::<f64>()
 }

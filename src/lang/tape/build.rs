@@ -1,0 +1,357 @@
+//! Recording a tape: each step is told in the order of evaluation, and becomes one operation or a few.
+//!
+//! `None` from a method means that a tape cannot do this step; whoever records then leaves the program to be run as it is.
+
+use super::form::{Form, Made};
+use super::op::Op;
+use super::{Input, Sums, Tape};
+use crate::dist::{Dist, Support, batch, batch_of_mixture};
+use crate::lang::builtins::{Binary, Builtin, CovarianceValue, Derivative, Kind, Reduction, Unary};
+use crate::lang::value::Value;
+use crate::num::Column;
+use smallvec::SmallVec;
+use std::sync::Arc;
+
+/// A tape in the making.
+#[derive(Debug, Default)]
+pub struct Builder {
+    values: Vec<f64>,
+    inputs: Vec<Input>,
+    ops: Vec<Op>,
+}
+
+impl Builder {
+    /// The tape of all that was told.
+    pub fn finish(self) -> Tape {
+        let adjoints = vec![0.0; self.values.len()];
+        let (values, inputs, ops) = (self.values, self.inputs, self.ops);
+        Tape { values, adjoints, inputs, ops, sums: Sums::default(), scratch: Vec::new() }
+    }
+
+    fn reserve(&mut self, n: usize) -> usize {
+        let at = self.values.len();
+        self.values.resize(at + n, f64::NAN);
+        at
+    }
+
+    /// A value that lies in the buffer, now with these numbers; `None` if it has anything but numbers in it.
+    pub fn place(&mut self, now: &Value) -> Option<Form> {
+        Some(match now {
+            Value::Num(x) => {
+                self.values.push(*x);
+                Form::Num(self.values.len() - 1)
+            }
+            Value::Array(xs) => {
+                let at = self.values.len();
+                self.values.extend(xs.iter());
+                Form::Array(at, xs.len())
+            }
+            Value::List(xs) => Form::List(xs.iter().map(|x| self.place(x)).collect::<Option<_>>()?),
+            Value::Record(r) => {
+                let fields = r.iter().map(|(name, x)| Some((Arc::clone(name), self.place(x)?)));
+                Form::Record(fields.collect::<Option<_>>()?)
+            }
+            _ => return None,
+        })
+    }
+
+    /// Makes a placed value, or a part of it, the image of the next coordinates under a support.
+    pub fn input(&mut self, support: Support, form: Form) {
+        let dimension = support.free_dim();
+        self.inputs.push(Input { support, form, dimension });
+    }
+
+    /// The numbers of a form: one, or several in a row.
+    fn column(&mut self, form: &Form) -> Option<Column> {
+        match form {
+            Form::Num(at) => Some(Column { at: *at, step: 0, live: true }),
+            Form::Array(at, _) => Some(Column { at: *at, step: 1, live: true }),
+            Form::Fixed(v @ (Value::Num(_) | Value::Bool(_))) => {
+                let at = self.values.len();
+                self.values.extend(v.numbers());
+                Some(Column { at, step: 0, live: false })
+            }
+            Form::Fixed(v @ (Value::Array(_) | Value::List(_))) => {
+                let (at, n) = (self.values.len(), v.len()?);
+                let plain = |x: Value| matches!(x, Value::Num(_) | Value::Bool(_));
+                if !(0..n).all(|i| v.element(i).is_some_and(plain)) {
+                    return None;
+                }
+                self.values.extend(v.numbers());
+                Some(Column { at, step: 1, live: false })
+            }
+            _ => None,
+        }
+    }
+
+    /// The result of a built-in, which now is `now`.
+    pub fn call(&mut self, builtin: &Builtin, args: Vec<Form>, now: &Value) -> Option<Form> {
+        if args.iter().all(Form::is_fixed) {
+            return Some(Form::Fixed(now.clone()));
+        }
+        let special = match (&builtin.derivative, &args[..]) {
+            (Derivative::Unary(f), [x]) => self.unary(f, x),
+            (Derivative::Binary(f), [x, y]) if numeric(now) => self.binary(f, x, y, now),
+            (Derivative::Reduction(f), [x]) => self.reduce(f, x),
+            _ if builtin.full_name() == "matmul" => self.matrix(&args),
+            _ => None,
+        };
+        if special.is_some() {
+            return special;
+        }
+        if matches!(builtin.derivative, Derivative::Unknown) && !matches!(builtin.kind, Kind::Distribution(_)) {
+            return None;
+        }
+        if numeric(now) {
+            let out = self.place(now)?;
+            self.ops.push(Op::Call { builtin: *builtin, args: args.into(), out: out.clone() });
+            return Some(out);
+        }
+        // What takes long to make is better made once.
+        let cheap = match now {
+            Value::Object(_) => now.downcast::<CovarianceValue>().is_some(),
+            Value::Bool(_) | Value::Dist(_) | Value::Str(_) => true,
+            Value::List(xs) => xs.iter().all(|x| matches!(x, Value::Bool(_) | Value::Dist(_))),
+            _ => false,
+        };
+        cheap.then(|| Form::Made(Arc::new(Made { builtin: *builtin, args: args.into() })))
+    }
+
+    fn unary(&mut self, f: &'static Unary, x: &Form) -> Option<Form> {
+        match x {
+            Form::Fixed(Value::Num(x)) => Some(Form::Fixed(Value::Num((f.value)(*x)))),
+            Form::List(all) => Some(Form::List(all.iter().map(|x| self.unary(f, x)).collect::<Option<_>>()?)),
+            Form::Num(x) => {
+                let out = self.reserve(1);
+                self.ops.push(Op::Unary { f, x: *x, out, n: 1 });
+                Some(Form::Num(out))
+            }
+            Form::Array(x, n) => {
+                let out = self.reserve(*n);
+                self.ops.push(Op::Unary { f, x: *x, out, n: *n });
+                Some(Form::Array(out, *n))
+            }
+            _ => None,
+        }
+    }
+
+    /// Pairs as the built-ins do: two arrays need equal lengths, anything else goes with every element.
+    fn binary(&mut self, f: &'static Binary, x: &Form, y: &Form, now: &Value) -> Option<Form> {
+        let flat =
+            |form: &Form| matches!(form, Form::Num(_) | Form::Array(..) | Form::Fixed(Value::Num(_) | Value::Array(_)));
+        if x.is_fixed() && y.is_fixed() {
+            return Some(Form::Fixed(now.clone()));
+        }
+        if flat(x) && flat(y) {
+            let n = x.len().or(y.len());
+            let (x, y) = (self.column(x)?, self.column(y)?);
+            let out = self.reserve(n.unwrap_or(1));
+            self.ops.push(Op::Binary { f, x, y, out, n: n.unwrap_or(1) });
+            return Some(n.map_or(Form::Num(out), |n| Form::Array(out, n)));
+        }
+        let n = x.len().or(y.len())?;
+        let part = |form: &Form, i: usize| if form.len().is_some() { form.element(i) } else { Some(form.clone()) };
+        let one = |i: usize| self.binary(f, &part(x, i)?, &part(y, i)?, &now.element(i)?);
+        let all = (0..n).map(one).collect::<Option<Vec<_>>>()?;
+        self.array(all)
+    }
+
+    fn reduce(&mut self, f: &'static Reduction, x: &Form) -> Option<Form> {
+        let Form::Array(x, n) = *x else { return None };
+        let out = self.reserve(1);
+        self.ops.push(Op::Reduce { f, x, n, out });
+        Some(Form::Num(out))
+    }
+
+    /// A fixed matrix times a vector.
+    fn matrix(&mut self, args: &[Form]) -> Option<Form> {
+        let [Form::Fixed(Value::List(list)), Form::Array(x, width)] = args else { return None };
+        let rows = self.values.len();
+        for row in list.iter() {
+            let Value::Array(xs) = row else { return None };
+            self.values.extend(xs.iter());
+        }
+        if self.values.len() != rows + list.len() * width {
+            return None;
+        }
+        let out = self.reserve(list.len());
+        self.ops.push(Op::Matrix { rows, x: *x, width: *width, out, n: list.len() });
+        Some(Form::Array(out, list.len()))
+    }
+
+    /// An array of these elements.
+    pub fn array(&mut self, all: Vec<Form>) -> Option<Form> {
+        if all.iter().all(Form::is_fixed) {
+            return Some(Form::Fixed(Value::from_elements(all.iter().map(Form::fixed).collect::<Option<_>>()?)));
+        }
+        if !all.iter().all(|f| matches!(f, Form::Num(_) | Form::Fixed(Value::Num(_)))) {
+            return Some(Form::List(all.into()));
+        }
+        let from = all.iter().map(|f| Some(self.column(f)?.at)).collect::<Option<_>>()?;
+        Some(self.gather(from))
+    }
+
+    fn gather(&mut self, from: Box<[usize]>) -> Form {
+        let n = from.len();
+        if n > 0 && from.iter().enumerate().all(|(i, at)| *at == from[0] + i) {
+            return Form::Array(from[0], n);
+        }
+        let out = self.reserve(n);
+        self.ops.push(Op::Gather { from, out });
+        Form::Array(out, n)
+    }
+
+    /// What indexing with these keys picks.
+    pub fn index(&mut self, base: &Form, keys: &[Value]) -> Option<Form> {
+        let Some((key, rest)) = keys.split_first() else { return Some(base.clone()) };
+        let within = |x: f64| (x >= 0.0 && x == libm::trunc(x)).then_some(x as usize);
+        let picked = match (base, key) {
+            (Form::Fixed(v), key) => Form::Fixed(crate::lang::index::index_value(v, key).ok()?),
+            (_, Value::Num(i)) => base.element(within(*i)?)?,
+            (_, Value::Str(name)) => base.field(name)?,
+            (Form::Array(at, n), Value::Array(keys)) => {
+                let places = keys.iter().map(|i| within(*i).filter(|i| i < n).map(|i| at + i));
+                self.gather(places.collect::<Option<_>>()?)
+            }
+            (Form::List(_), Value::Array(keys)) => {
+                let all = keys.iter().map(|i| base.element(within(*i)?)).collect::<Option<_>>()?;
+                self.array(all)?
+            }
+            _ => return None,
+        };
+        self.index(&picked, rest)
+    }
+
+    /// From here on the tape holds only where this value is what it is now.
+    pub fn guard(&mut self, form: &Form, now: &Value) -> Option<()> {
+        if !form.is_fixed() {
+            self.ops.push(Op::Guard { form: form.clone(), value: now.clone() });
+        }
+        Some(())
+    }
+
+    /// A log weight.
+    pub fn factor(&mut self, weight: &Form) -> Option<()> {
+        match *weight {
+            Form::Num(x) => self.ops.push(Op::Factor { x }),
+            _ if weight.is_fixed() => {}
+            _ => return None,
+        }
+        Some(())
+    }
+
+    /// The log density of a value under the distribution that a family gives for these arguments, which now is `dist`.
+    pub fn family(&mut self, builtin: &Builtin, args: Vec<Form>, dist: &Dist, x: &Form, observed: bool) -> Option<()> {
+        if x.is_fixed() && args.iter().all(Form::is_fixed) {
+            return Some(());
+        }
+        // Of `iid(d, n)`, d is what moves.
+        let inner = match (dist, args.first()) {
+            (Dist::Iid(_), Some(Form::Made(m))) if args[1..].iter().all(Form::is_fixed) => Some(Arc::clone(m)),
+            _ => None,
+        };
+        let params = inner.as_ref().map_or(&args[..], |m| &m.args);
+        if self.mixture(dist, params, x, observed).is_some() || self.density(dist, params, x, observed).is_some() {
+            return Some(());
+        }
+        let dist = match args.iter().all(Form::is_fixed) {
+            true => Form::Fixed(Value::Dist(Arc::new(dist.clone()))),
+            false => Form::Made(Arc::new(Made { builtin: *builtin, args: args.into() })),
+        };
+        self.score(dist, x.clone(), observed)
+    }
+
+    /// The log density of a value under a distribution or likelihood, which now is `now`.
+    pub fn distribution(&mut self, dist: &Form, now: &Value, x: &Form, observed: bool) -> Option<()> {
+        if x.is_fixed() && dist.is_fixed() {
+            return Some(());
+        }
+        match (dist, now) {
+            (Form::Made(m), Value::Dist(d)) => {
+                let m = Arc::clone(m);
+                self.family(&m.builtin, m.args.to_vec(), d, x, observed)
+            }
+            (Form::Fixed(_), Value::Dist(d)) if self.density(d, &[], x, observed).is_some() => Some(()),
+            _ => self.score(dist.clone(), x.clone(), observed),
+        }
+    }
+
+    fn score(&mut self, dist: Form, x: Form, observed: bool) -> Option<()> {
+        self.ops.push(Op::Score { dist, x, observed });
+        Some(())
+    }
+
+    /// Numbers under a mixture.
+    fn mixture(&mut self, dist: &Dist, params: &[Form], x: &Form, observed: bool) -> Option<()> {
+        let (Dist::Mixture(d), [weights, components]) = (dist, params) else { return None };
+        // As with other distributions of a number, many observed values are independent.
+        if !observed && x.len().is_some() {
+            return None;
+        }
+        let mut columns = Vec::new();
+        for i in 0..components.len()? {
+            columns.push(match components.element(i)? {
+                Form::Made(m) => m.args.iter().map(|f| self.column(f)).collect::<Option<_>>()?,
+                Form::Fixed(_) => SmallVec::new(),
+                _ => return None,
+            });
+        }
+        let weights = if weights.is_fixed() { None } else { Some(self.column(weights)?) };
+        let batch = batch_of_mixture(d, weights, columns)?;
+        let x_column = self.column(x)?;
+        let n = x.len().unwrap_or(1);
+        self.ops.push(Op::Density { batch, x: x_column, params: SmallVec::new(), n, observed });
+        Some(())
+    }
+
+    /// Numbers under one family.
+    fn density(&mut self, dist: &Dist, params: &[Form], x: &Form, observed: bool) -> Option<()> {
+        let n = x.len().unwrap_or(1);
+        let fits = match (dist.elements(), x.len()) {
+            (Some(elements), Some(n)) => elements == n,
+            (Some(_), None) => false,
+            // Many observed values under one distribution of a number are independent.
+            (None, len) => observed || len.is_none(),
+        };
+        let fixed = params.iter().all(Form::is_fixed);
+        let own_columns = params.iter().all(|p| p.len().is_none_or(|len| len == n && matches!(dist, Dist::Product(_))));
+        let is_truth = |f: &Form| matches!(f, Form::Fixed(v) if is_bools(v));
+        // A truth value is no number to any other family, nor a number a truth value.
+        let flips = matches!(one_of(dist), Dist::Flip(_));
+        if !fits || !(fixed || own_columns) || flips != is_truth(x) {
+            return None;
+        }
+        let columns: SmallVec<[Column; 3]> = match fixed {
+            true => SmallVec::new(),
+            false => params.iter().map(|p| self.column(p)).collect::<Option<_>>()?,
+        };
+        let batch = batch(dist, &columns)?;
+        let x = self.column(x)?;
+        self.ops.push(Op::Density { batch, x, params: columns, n, observed });
+        Some(())
+    }
+}
+
+/// The distribution of the first element.
+fn one_of(dist: &Dist) -> Dist {
+    dist.element(0)
+}
+
+/// Whether a value is a truth value, or an array of them.
+fn is_bools(v: &Value) -> bool {
+    match v {
+        Value::Bool(_) => true,
+        Value::List(xs) => !xs.is_empty() && xs.iter().all(|x| matches!(x, Value::Bool(_))),
+        _ => false,
+    }
+}
+
+/// Whether a value has nothing but numbers in it.
+fn numeric(v: &Value) -> bool {
+    match v {
+        Value::Num(_) | Value::Array(_) => true,
+        Value::List(xs) => xs.iter().all(numeric),
+        Value::Record(r) => r.values().all(numeric),
+        _ => false,
+    }
+}

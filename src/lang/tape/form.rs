@@ -1,0 +1,231 @@
+//! What a tape knows of a value: where its numbers are, or how it is made.
+
+use crate::dist::Dist;
+use crate::lang::adjoint::Adjoint;
+use crate::lang::builtins::{Args, Builtin, Kind};
+use crate::lang::density;
+use crate::lang::value::Value;
+use smallvec::SmallVec;
+use std::sync::Arc;
+
+/// A value on a tape.
+#[derive(Clone, Debug)]
+pub enum Form {
+    /// One that depends on nothing the tape starts from.
+    Fixed(Value),
+    /// The number at a place of the buffer.
+    Num(usize),
+    /// So many numbers from a place on.
+    Array(usize, usize),
+    /// An array of anything else.
+    List(Arc<[Form]>),
+    /// A record.
+    Record(Arc<[(Arc<str>, Form)]>),
+    /// The result of a call that has no place in the buffer (a truth value, a distribution, a covariance): made when it is needed.
+    Made(Arc<Made>),
+}
+
+/// A call and the forms of its arguments.
+#[derive(Debug)]
+pub struct Made {
+    pub(super) builtin: Builtin,
+    pub(super) args: Box<[Form]>,
+}
+
+impl Form {
+    /// Whether it depends on nothing the tape starts from.
+    pub fn is_fixed(&self) -> bool {
+        match self {
+            Form::Fixed(_) => true,
+            Form::List(all) => all.iter().all(Form::is_fixed),
+            Form::Record(all) => all.iter().all(|(_, f)| f.is_fixed()),
+            _ => false,
+        }
+    }
+
+    /// The value, if it is fixed.
+    pub fn fixed(&self) -> Option<Value> {
+        self.is_fixed().then(|| self.value(&[])).flatten()
+    }
+
+    /// The number of elements, for arrays.
+    pub(super) fn len(&self) -> Option<usize> {
+        match self {
+            Form::Fixed(v @ (Value::Array(_) | Value::List(_))) => v.len(),
+            Form::Array(_, n) => Some(*n),
+            Form::List(all) => Some(all.len()),
+            _ => None,
+        }
+    }
+
+    /// Element `i` of an array.
+    pub fn element(&self, i: usize) -> Option<Form> {
+        match self {
+            Form::Fixed(v) => v.element(i).map(Form::Fixed),
+            Form::Array(at, n) => (i < *n).then_some(Form::Num(at + i)),
+            Form::List(all) => all.get(i).cloned(),
+            _ => None,
+        }
+    }
+
+    /// Element `i` of an array, or the field at that place of a record.
+    pub fn position(&self, i: usize) -> Option<Form> {
+        match self {
+            Form::Fixed(Value::Record(r)) => r.get_index(i).map(|(_, v)| Form::Fixed(v.clone())),
+            Form::Record(all) => all.get(i).map(|(_, f)| f.clone()),
+            other => other.element(i),
+        }
+    }
+
+    /// A field of a record.
+    pub(super) fn field(&self, name: &str) -> Option<Form> {
+        match self {
+            Form::Fixed(Value::Record(r)) => r.get(name).cloned().map(Form::Fixed),
+            Form::Record(all) => all.iter().find(|(n, _)| **n == *name).map(|(_, f)| f.clone()),
+            _ => None,
+        }
+    }
+
+    /// The value, from the numbers in the buffer; `None` if a call fails.
+    pub(super) fn value(&self, buffer: &[f64]) -> Option<Value> {
+        Some(match self {
+            Form::Fixed(v) => v.clone(),
+            Form::Num(at) => Value::Num(buffer[*at]),
+            Form::Array(at, n) => Value::Array(buffer[*at..at + n].into()),
+            Form::List(all) => Value::from_elements(all.iter().map(|f| f.value(buffer)).collect::<Option<_>>()?),
+            Form::Record(all) => {
+                let fields = all.iter().map(|(name, f)| Some((Arc::clone(name), f.value(buffer)?)));
+                Value::Record(Arc::new(fields.collect::<Option<_>>()?))
+            }
+            Form::Made(m) => call(&m.builtin, &m.args, buffer)?.1,
+        })
+    }
+
+    /// Puts a value of this form into the buffer; false if it is of another form.
+    pub(super) fn write(&self, buffer: &mut [f64], value: &Value) -> bool {
+        match (self, value) {
+            (Form::Num(at), Value::Num(x)) => {
+                buffer[*at] = *x;
+                true
+            }
+            (Form::Array(at, n), Value::Array(xs)) if xs.len() == *n => {
+                buffer[*at..at + n].copy_from_slice(xs);
+                true
+            }
+            (Form::List(all), Value::List(xs)) if xs.len() == all.len() => {
+                all.iter().zip(xs.iter()).all(|(f, x)| f.write(buffer, x))
+            }
+            (Form::Record(all), Value::Record(r)) if r.len() == all.len() => {
+                all.iter().zip(r.iter()).all(|((name, f), (other, x))| name == other && f.write(buffer, x))
+            }
+            (Form::Fixed(v), x) => v.same(x),
+            _ => false,
+        }
+    }
+
+    /// Calls `f` with the place of each number, in order.
+    pub(super) fn each_place(&self, f: &mut impl FnMut(usize)) {
+        match self {
+            Form::Num(at) => f(*at),
+            Form::Array(at, n) => (*at..at + n).for_each(f),
+            Form::List(all) => all.iter().for_each(|one| one.each_place(f)),
+            Form::Record(all) => all.iter().for_each(|(_, one)| one.each_place(f)),
+            _ => {}
+        }
+    }
+
+    /// The adjoint of a value that lies in the buffer.
+    pub(super) fn adjoint(&self, adjoints: &[f64]) -> Adjoint {
+        match self {
+            Form::Num(at) => Adjoint::Num(adjoints[*at]),
+            Form::Array(at, n) => Adjoint::Array(adjoints[*at..at + n].to_vec()),
+            Form::List(all) => Adjoint::List(all.iter().map(|f| f.adjoint(adjoints)).collect()),
+            Form::Record(all) => {
+                Adjoint::Record(all.iter().map(|(n, f)| (Arc::clone(n), f.adjoint(adjoints))).collect())
+            }
+            _ => Adjoint::Zero,
+        }
+    }
+
+    /// Adds an adjoint to those of the numbers this is made of; false if a derivative is not known.
+    pub(super) fn pull(&self, by: &Adjoint, buffer: &[f64], adjoints: &mut [f64]) -> bool {
+        if by.is_zero() || self.is_fixed() {
+            return true;
+        }
+        if by.is_unknown() {
+            return false;
+        }
+        match self {
+            Form::Fixed(_) => true,
+            Form::Num(at) => {
+                adjoints[*at] += by.number();
+                true
+            }
+            Form::Array(at, n) => {
+                match by {
+                    Adjoint::Array(gs) if gs.len() == *n => {
+                        adjoints[*at..at + n].iter_mut().zip(gs).for_each(|(a, g)| *a += g);
+                    }
+                    _ => (0..*n).for_each(|i| adjoints[at + i] += by.element(i).number()),
+                }
+                true
+            }
+            Form::List(all) => all.iter().enumerate().all(|(i, f)| f.pull(&by.element(i), buffer, adjoints)),
+            Form::Record(all) => all.iter().all(|(name, f)| f.pull(&by.field(name), buffer, adjoints)),
+            Form::Made(m) => pull_call(&m.builtin, &m.args, by, buffer, adjoints),
+        }
+    }
+
+    /// Passes the derivatives by the parameters of a distribution, and by a covariance among them, on to what it was made of.
+    pub(super) fn pull_dist(
+        &self,
+        dist: &Dist,
+        params: Vec<f64>,
+        by_matrix: impl FnOnce(&Args) -> Option<Option<(usize, Adjoint)>>,
+        buffer: &[f64],
+        adjoints: &mut [f64],
+    ) -> bool {
+        let Form::Made(m) = self else { return self.pull(&Adjoint::Array(params), buffer, adjoints) };
+        let Some((values, _)) = call(&m.builtin, &m.args, buffer) else { return false };
+        let values: SmallVec<[&Value; 4]> = values.iter().collect();
+        let a = Args { builtin: &m.builtin, values: &values };
+        let mut pulled = density::by_arguments(&a, dist, &params);
+        if let Some((i, _)) = density::matrix(&a, dist) {
+            if let Some(p) = pulled.get_mut(i) {
+                *p = Adjoint::Zero;
+            }
+            if m.args.get(i).is_some_and(|f| !f.is_fixed()) {
+                match by_matrix(&a) {
+                    Some(Some((i, by))) if i < pulled.len() => pulled[i] = by,
+                    _ => return false,
+                }
+            }
+        }
+        m.args.iter().zip(&pulled).all(|(f, by)| f.pull(by, buffer, adjoints))
+    }
+}
+
+/// The arguments of a call and its result.
+pub(super) fn call(builtin: &Builtin, args: &[Form], buffer: &[f64]) -> Option<(SmallVec<[Value; 4]>, Value)> {
+    let values: SmallVec<[Value; 4]> = args.iter().map(|f| f.value(buffer)).collect::<Option<_>>()?;
+    let value = builtin.apply(&values.iter().collect::<SmallVec<[&Value; 4]>>()).ok()?;
+    Some((values, value))
+}
+
+/// Passes the adjoint of a call's result on to its arguments.
+pub(super) fn pull_call(builtin: &Builtin, args: &[Form], by: &Adjoint, buffer: &[f64], adjoints: &mut [f64]) -> bool {
+    let Some((values, value)) = call(builtin, args, buffer) else { return false };
+    let refs: SmallVec<[&Value; 4]> = values.iter().collect();
+    let a = Args { builtin, values: &refs };
+    let pulled = match (builtin.kind, &value) {
+        (Kind::Distribution(_), Value::Dist(d)) => {
+            let params = by.numbers(if let Adjoint::Array(gs) = by { gs.len() } else { 0 });
+            density::by_arguments(&a, d, &params)
+        }
+        _ => match builtin.derivative.pull(&a, &value, by) {
+            Some(pulled) => pulled,
+            None => return false,
+        },
+    };
+    args.iter().zip(&pulled).all(|(f, by)| f.pull(by, buffer, adjoints))
+}

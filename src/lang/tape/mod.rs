@@ -1,0 +1,149 @@
+//! Tapes: the straight line of arithmetic that leads from some numbers to a log density, recorded once and run many times.
+//!
+//! A tape keeps every number in one buffer and every derivative in another of the same layout; running it forwards or backwards
+//! allocates nothing where all operations are arithmetic on numbers and arrays, and densities of numbers. Other operations call the
+//! built-in itself, and its vector-Jacobian product. It knows nothing of traces: [`Builder`] is told what to compute, in order.
+//!
+//! Invariant: the same functions on the same numbers as the program, and scores summed exactly, so that a density is that of the
+//! program to the last bit. What a tape cannot tell (a parameter outside its domain, a condition that turned out otherwise) it
+//! says, and the program itself has to be run.
+
+mod build;
+mod form;
+mod op;
+
+pub use build::Builder;
+pub use form::Form;
+
+use crate::dist::{Datum, Support};
+use crate::lang::value::Value;
+use crate::num::ExactSum;
+use op::Op;
+
+/// What the scores on a tape add up to.
+#[derive(Clone, Debug, Default, PartialEq)]
+pub struct Sums {
+    /// The log prior of the choices on the tape.
+    pub prior: ExactSum,
+    /// The log density of the observations and factors on the tape.
+    pub likelihood: ExactSum,
+    /// The log Jacobians of the transforms.
+    pub jacobian: ExactSum,
+}
+
+/// Numbers that a tape starts from: a value that is the image of unconstrained coordinates under its support.
+#[derive(Debug)]
+struct Input {
+    support: Support,
+    form: Form,
+    dimension: usize,
+}
+
+/// A recorded log density.
+#[derive(Debug)]
+pub struct Tape {
+    values: Vec<f64>,
+    adjoints: Vec<f64>,
+    inputs: Vec<Input>,
+    ops: Vec<Op>,
+    sums: Sums,
+    scratch: Vec<f64>,
+}
+
+impl Tape {
+    /// What the scores added up to when it was last run.
+    pub fn sums(&self) -> &Sums {
+        &self.sums
+    }
+
+    /// Runs it where its inputs have these values, by their number, and gives the coordinates. False where it cannot tell what
+    /// the program does there.
+    pub fn stand(&mut self, mut value: impl FnMut(usize) -> Value, y: &mut Vec<f64>) -> bool {
+        self.sums = Sums::default();
+        y.clear();
+        for (i, input) in self.inputs.iter().enumerate() {
+            let (x, from) = (value(i), y.len());
+            let Some(datum) = x.to_datum() else { return false };
+            input.support.to_free(&datum, y);
+            let jacobian = match y[from..] {
+                [y] if matches!(input.form, Form::Num(_)) => input.support.from_free_scalar(y).1,
+                ref own => input.support.from_free(own).1,
+            };
+            self.sums.jacobian.add(jacobian);
+            if !input.form.write(&mut self.values, &x) {
+                return false;
+            }
+        }
+        self.forward()
+    }
+
+    /// Runs it at a point of unconstrained space. False where it cannot tell what the program does there.
+    pub fn run(&mut self, y: &[f64]) -> bool {
+        self.sums = Sums::default();
+        let mut rest = y;
+        for input in &self.inputs {
+            let Some((own, after)) = rest.split_at_checked(input.dimension) else { return false };
+            rest = after;
+            let jacobian = match (&input.form, own) {
+                (Form::Num(at), [y]) => {
+                    let (x, jacobian) = input.support.from_free_scalar(*y);
+                    self.values[*at] = x;
+                    jacobian
+                }
+                (form, own) => {
+                    let (x, jacobian) = input.support.from_free(own);
+                    if !form.write(&mut self.values, &Value::from_datum(&x)) {
+                        return false;
+                    }
+                    jacobian
+                }
+            };
+            self.sums.jacobian.add(jacobian);
+        }
+        self.forward()
+    }
+
+    /// The values of the inputs at a point of unconstrained space, in order.
+    pub fn images(&self, y: &[f64]) -> impl Iterator<Item = Datum> {
+        let mut rest = y;
+        self.inputs.iter().map(move |input| {
+            let (own, after) = rest.split_at(input.dimension.min(rest.len()));
+            rest = after;
+            input.support.from_free(own).0
+        })
+    }
+
+    fn forward(&mut self) -> bool {
+        let (values, sums) = (&mut self.values, &mut self.sums);
+        self.ops.iter_mut().all(|op| op.forward(values, sums))
+    }
+
+    /// The derivatives, by the coordinates at which it was last run, of the log prior plus `power` times the log likelihood plus
+    /// the log Jacobians. False where one is not known.
+    pub fn gradient(&mut self, y: &[f64], power: f64, out: &mut Vec<f64>) -> bool {
+        out.clear();
+        self.adjoints.clear();
+        self.adjoints.resize(self.values.len(), 0.0);
+        let (values, adjoints, scratch) = (&self.values, &mut self.adjoints, &mut self.scratch);
+        if !self.ops.iter().rev().all(|op| op.reverse(values, adjoints, power, scratch)) {
+            return false;
+        }
+        let mut rest = y;
+        for input in &self.inputs {
+            let Some((own, after)) = rest.split_at_checked(input.dimension) else { return false };
+            rest = after;
+            match &input.form {
+                Form::Num(at) => input.support.free_gradient(own, &adjoints[*at..=*at], out),
+                form => {
+                    scratch.clear();
+                    form.each_place(&mut |at| scratch.push(adjoints[at]));
+                    input.support.free_gradient(own, scratch, out);
+                }
+            }
+        }
+        true
+    }
+}
+
+#[cfg(test)]
+mod tests;

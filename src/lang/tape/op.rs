@@ -1,0 +1,182 @@
+//! The operations of a tape, forwards and backwards.
+
+use super::Sums;
+use super::form::{Form, call, pull_call};
+use crate::dist::{Batch, Dist};
+use crate::lang::builtins::{Binary, Builtin, Reduction, Unary, times};
+use crate::lang::density;
+use crate::lang::value::Value;
+use crate::num::{Column, ExactSum};
+use smallvec::SmallVec;
+
+/// An operation: it reads numbers that lie before those it writes.
+#[derive(Debug)]
+pub(super) enum Op {
+    /// A function of one number, element by element.
+    Unary { f: &'static Unary, x: usize, out: usize, n: usize },
+    /// A function of two.
+    Binary { f: &'static Binary, x: Column, y: Column, out: usize, n: usize },
+    /// A function of an array that gives one number.
+    Reduce { f: &'static Reduction, x: usize, n: usize, out: usize },
+    /// A fixed matrix, row by row from `rows` on, times a vector.
+    Matrix { rows: usize, x: usize, width: usize, out: usize, n: usize },
+    /// Numbers from anywhere side by side.
+    Gather { from: Box<[usize]>, out: usize },
+    /// A call of any built-in whose result is of a form that lies in the buffer.
+    Call { builtin: Builtin, args: Box<[Form]>, out: Form },
+    /// What must be as it was when the tape was recorded.
+    Guard { form: Form, value: Value },
+    /// The log densities of numbers.
+    Density { batch: Box<dyn Batch>, x: Column, params: SmallVec<[Column; 3]>, n: usize, observed: bool },
+    /// The log density of any value under any distribution or likelihood.
+    Score { dist: Form, x: Form, observed: bool },
+    /// A log weight.
+    Factor { x: usize },
+}
+
+impl Op {
+    /// Runs it; false if that cannot be told from here.
+    pub fn forward(&mut self, v: &mut [f64], sums: &mut Sums) -> bool {
+        match self {
+            Op::Unary { f, x, out, n } => {
+                let (before, y) = v.split_at_mut(*out);
+                y[..*n].iter_mut().zip(&before[*x..*x + *n]).for_each(|(y, x)| *y = (f.value)(*x));
+                true
+            }
+            Op::Binary { f, x, y, out, n } => {
+                (f.forward)(v, *x, *y, *out, *n);
+                true
+            }
+            Op::Reduce { f, x, n, out } => {
+                v[*out] = (f.value)(&v[*x..*x + *n]);
+                true
+            }
+            Op::Matrix { rows, x, width, out, n } => {
+                let (before, y) = v.split_at_mut(*out);
+                let x = &before[*x..*x + *width];
+                let rows = before[*rows..].chunks_exact((*width).max(1));
+                y[..*n].iter_mut().zip(rows).for_each(|(y, row)| *y = crate::lang::builtins::dot(row, x));
+                true
+            }
+            Op::Gather { from, out } => {
+                from.iter().enumerate().for_each(|(i, at)| v[*out + i] = v[*at]);
+                true
+            }
+            Op::Call { builtin, args, out } => match call(builtin, args, v) {
+                Some((_, value)) => out.write(v, &value),
+                None => false,
+            },
+            Op::Guard { form, value } => form.value(v).is_some_and(|now| now.same(value)),
+            Op::Density { batch, x, params, n, observed } => batch.score(v, *x, params, *n, sums.of(*observed)),
+            Op::Score { dist, x, observed } => {
+                let (Some(dist), Some(x)) = (dist.value(v), x.value(v)) else { return false };
+                score(&dist, &x, *observed, sums.of(*observed))
+            }
+            Op::Factor { x } => {
+                sums.likelihood.add(v[*x]);
+                !v[*x].is_nan()
+            }
+        }
+    }
+
+    /// Passes adjoints back; false if a derivative is not known.
+    pub fn reverse(&self, v: &[f64], g: &mut [f64], power: f64, scratch: &mut Vec<f64>) -> bool {
+        let weight = |observed: bool| if observed { power } else { 1.0 };
+        match self {
+            Op::Unary { f, x, out, n } => {
+                for i in 0..*n {
+                    g[x + i] += times(g[out + i], (f.slope)(v[x + i], v[out + i]));
+                }
+                true
+            }
+            Op::Binary { f, x, y, out, n } => {
+                (f.reverse)(v, g, *x, *y, *out, *n);
+                true
+            }
+            Op::Reduce { f, x, n, out } => {
+                let by = g[*out];
+                scratch.clear();
+                scratch.resize(*n, 0.0);
+                (f.slopes)(&v[*x..x + n], v[*out], scratch);
+                g[*x..x + n].iter_mut().zip(scratch).for_each(|(g, s)| *g += times(by, *s));
+                true
+            }
+            Op::Matrix { rows, x, width, out, n } => {
+                let (before, by) = g.split_at_mut(*out);
+                let rows = v[*rows..].chunks_exact((*width).max(1));
+                for (by, row) in by[..*n].iter().zip(rows) {
+                    before[*x..x + width].iter_mut().zip(row).for_each(|(g, a)| *g += times(*by, *a));
+                }
+                true
+            }
+            Op::Gather { from, out } => {
+                from.iter().enumerate().for_each(|(i, at)| g[*at] += g[out + i]);
+                true
+            }
+            Op::Call { builtin, args, out } => {
+                let by = out.adjoint(g);
+                pull_call(builtin, args, &by, v, g)
+            }
+            Op::Guard { .. } => true,
+            Op::Density { batch, x, params, n, observed } => {
+                batch.pull(v, g, *x, params, *n, weight(*observed));
+                true
+            }
+            Op::Score { dist, x, observed } => pull_score(dist, x, *observed, v, g, weight(*observed)).unwrap_or(false),
+            Op::Factor { x } => {
+                g[*x] += power;
+                true
+            }
+        }
+    }
+}
+
+impl Sums {
+    fn of(&mut self, observed: bool) -> &mut ExactSum {
+        if observed { &mut self.likelihood } else { &mut self.prior }
+    }
+}
+
+/// Adds the log density of a value; false if it has none.
+fn score(dist: &Value, x: &Value, observed: bool, sum: &mut ExactSum) -> bool {
+    let found = match dist {
+        // What is drawn as one choice has one density, also where it is an array.
+        Value::Dist(d) if !observed && d.elements().is_none() => {
+            x.to_datum().map(|x| density::Score::One(d.log_density_stored(&x)))
+        }
+        Value::Dist(d) => density::score(d, x).ok(),
+        Value::Likelihood(_) => density::likelihood_score(dist, x).ok().map(density::Score::One),
+        _ => None,
+    };
+    match found {
+        Some(density::Score::One(score)) => sum.add(score),
+        Some(density::Score::Sum(scores)) => sum.merge(&scores),
+        None => return false,
+    }
+    true
+}
+
+fn pull_score(dist: &Form, x: &Form, observed: bool, v: &[f64], g: &mut [f64], weight: f64) -> Option<bool> {
+    let (made, value) = (dist.value(v)?, x.value(v)?);
+    if let Value::Likelihood(l) = &made {
+        let mut by = l.gradient(&value)?;
+        by.scale(weight);
+        return Some(dist.pull(&by, v, g));
+    }
+    let Value::Dist(d) = &made else { return None };
+    let (mut by_x, mut params) = density::gradient(d, &value)?;
+    by_x.scale(weight);
+    params.iter_mut().for_each(|p| *p *= weight);
+    let stored = value.to_datum()?;
+    // What is observed is the value, however a choice would be stored.
+    let scored: Dist = if observed { Dist::clone(d).centred() } else { Dist::clone(d) };
+    let by_matrix = |a: &crate::lang::builtins::Args| {
+        density::by_matrix(a, &scored, &stored, &[]).map(|found| {
+            found.map(|(i, mut by)| {
+                by.scale(weight);
+                (i, by)
+            })
+        })
+    };
+    Some(x.pull(&by_x, v, g) && dist.pull_dist(d, params, by_matrix, v, g))
+}

@@ -1,0 +1,338 @@
+//! Recording the log density as a function of some choices on a tape ([`crate::lang::tape`]).
+//!
+//! What an update of the choices may reach is marked as an update would mark it; those nodes, operands first, are told to the
+//! tape. Structure is taken as it is: where it hangs on something that moves, the tape holds a guard that tells when it is no longer
+//! so, or there is no tape at all. It is not an evaluation: nothing in the trace changes.
+
+use super::{Inputs, Reverse};
+use crate::dist::Dist;
+use crate::lang::code::{Callee, Code, DistSpec, Op, Operand};
+use crate::lang::tape::{Builder, Form, Tape};
+use crate::lang::value::Value;
+use crate::trace::choices::Target;
+use crate::trace::graph::Graph;
+use crate::trace::journal::Entry;
+use crate::trace::node::*;
+use rustc_hash::{FxHashMap, FxHashSet};
+
+impl Graph {
+    /// The nodes that an update of these choices may run.
+    fn reached(&mut self, code: &Code, targets: &[Target]) -> Vec<NodeId> {
+        let before = self.begin();
+        for (i, t) in targets.iter().enumerate() {
+            // Elements of one choice come one after the other.
+            if i == 0 || targets[i - 1].node != t.node {
+                self.mark_target(code, t.node);
+            }
+        }
+        let mut all: Vec<NodeId> =
+            self.journal.iter().filter_map(|e| if let Entry::Node { id, .. } = e { Some(*id) } else { None }).collect();
+        self.rollback(code, before);
+        all.sort_unstable();
+        all
+    }
+
+    /// The log density by the unconstrained coordinates of the targets, one after the other; `None` where it cannot be told in
+    /// a straight line.
+    pub fn record(&mut self, code: &Code, targets: &[Target]) -> Option<Tape> {
+        let reached = self.reached(code, targets);
+        let view = Reverse {
+            graph: self,
+            code,
+            marks: Vec::new(),
+            order: Vec::new(),
+            adjoints: FxHashMap::default(),
+            power: 1.0,
+        };
+        let mut r = Recorder {
+            view,
+            reached: reached.iter().copied().collect(),
+            placed: FxHashMap::default(),
+            forms: FxHashMap::default(),
+            tape: Builder::default(),
+        };
+        for t in targets {
+            r.place(*t)?;
+        }
+        for n in reached {
+            r.visit(n)?;
+        }
+        Some(r.tape.finish())
+    }
+}
+
+struct Recorder<'a> {
+    view: Reverse<'a>,
+    reached: FxHashSet<NodeId>,
+    /// The values of the choices that move.
+    placed: FxHashMap<NodeId, Form>,
+    /// The forms of the nodes told so far.
+    forms: FxHashMap<NodeId, Form>,
+    tape: Builder,
+}
+
+impl Recorder<'_> {
+    fn place(&mut self, t: Target) -> Option<()> {
+        let (graph, code) = (self.view.graph, self.view.code);
+        let dist = graph.dist_of(code, t.node)?;
+        if dist.is_stored_whitened() || graph.is_whitened(t.node) {
+            return None;
+        }
+        let whole = match self.placed.get(&t.node) {
+            Some(form) => form.clone(),
+            None => {
+                let form = self.tape.place(&graph.nodes[t.node as usize].value)?;
+                self.placed.insert(t.node, form.clone());
+                form
+            }
+        };
+        let (dist, form) = match t.element {
+            NONE if dist.elements().is_some() => return None,
+            NONE => (dist, whole),
+            i => (dist.element(i as usize), whole.element(i as usize)?),
+        };
+        self.tape.input(dist.stored_support(), form);
+        Some(())
+    }
+
+    /// Tells a node, after all that it reads.
+    fn visit(&mut self, root: NodeId) -> Option<()> {
+        if self.forms.contains_key(&root) {
+            return Some(());
+        }
+        let mut stack: Vec<(NodeId, Inputs, usize)> = vec![(root, self.reads(root), 0)];
+        while let Some((n, reads, next)) = stack.last_mut() {
+            if let Some(read) = reads.get(*next).copied() {
+                *next += 1;
+                if self.reached.contains(&read) && !self.forms.contains_key(&read) {
+                    let inner = self.reads(read);
+                    stack.push((read, inner, 0));
+                }
+                continue;
+            }
+            let n = *n;
+            let fixed = !self.placed.contains_key(&n) && reads.iter().all(|r| self.form(*r).is_fixed());
+            stack.pop();
+            let form = match fixed {
+                true => Form::Fixed(self.value(n).clone()),
+                false => self.tell(n)?,
+            };
+            self.forms.insert(n, form);
+        }
+        Some(())
+    }
+
+    /// All that a node's value, score or structure is taken from.
+    fn reads(&self, n: NodeId) -> Inputs {
+        let mut all = self.view.inputs(n, true);
+        self.view.graph.each_dep(self.view.code, n, |d, _| all.push(d));
+        all
+    }
+
+    fn value(&self, n: NodeId) -> &Value {
+        &self.view.graph.nodes[n as usize].value
+    }
+
+    fn form(&self, n: NodeId) -> Form {
+        self.forms.get(&n).cloned().unwrap_or_else(|| Form::Fixed(self.value(n).clone()))
+    }
+
+    fn operand(&self, frame: FrameId, o: Operand) -> Form {
+        match self.view.source(frame, o) {
+            Some(n) => self.form(n),
+            None => Form::Fixed(self.view.graph.value(self.view.code, frame, o).clone()),
+        }
+    }
+
+    fn operands(&self, frame: FrameId, all: &[Operand]) -> Vec<Form> {
+        all.iter().map(|o| self.operand(frame, *o)).collect()
+    }
+
+    /// The form of the one node whose value is handed on.
+    fn handed_on(&self, n: NodeId) -> Option<Form> {
+        match &self.view.inputs(n, false)[..] {
+            [] => Some(Form::Fixed(self.value(n).clone())),
+            [one] => Some(self.form(*one)),
+            _ => None,
+        }
+    }
+
+    /// Tells the tape what a node does. `None` where it cannot.
+    fn tell(&mut self, n: NodeId) -> Option<Form> {
+        let (graph, code) = (self.view.graph, self.view.code);
+        let frame = graph.nodes[n as usize].frame;
+        let side = graph.nodes[n as usize].side.as_deref();
+        let now = graph.nodes[n as usize].value.clone();
+        match graph.op(code, n) {
+            Op::Prim { builtin, args } => {
+                let args = self.operands(frame, args);
+                self.tape.call(code.builtins.get(*builtin), args, &now)
+            }
+            Op::Array(items) => {
+                let all = self.operands(frame, items);
+                self.tape.array(all)
+            }
+            Op::Record { names, values } => {
+                let values = self.operands(frame, values);
+                Some(Form::Record(names.iter().cloned().zip(values).collect()))
+            }
+            Op::Index { base, keys } => {
+                for (form, k) in self.operands(frame, keys).iter().zip(keys.iter()) {
+                    let now = graph.plain(code, frame, *k, &mut Deps::new()).clone();
+                    self.tape.guard(form, &now)?;
+                }
+                match graph.resolve(frame, *base) {
+                    Some(_) => {
+                        let (source, keys) = self.view.indexed(n)?;
+                        self.tape.index(&self.form(source), &keys)
+                    }
+                    // What a constant gives at keys that stay.
+                    None => Some(Form::Fixed(now)),
+                }
+            }
+            Op::Param { default, .. } => match (graph.argument(code, n), self.view.passed(n)) {
+                (Some((from, o)), _) => Some(self.operand(from, o)),
+                (None, Some((source, Some(i)))) => self.form(source).position(i),
+                (None, Some((source, None))) => Some(self.form(source)),
+                (None, None) => default.map(|o| self.operand(frame, o)),
+            },
+            Op::Item => {
+                let (source, i) = self.view.passed(n)?;
+                self.form(source).position(i?)
+            }
+            Op::Accumulator => self.handed_on(n),
+            Op::Gather => self.tell_gather(n, &now),
+            Op::Call { callee: Callee::Value(f), args, .. } => {
+                if !self.operand(frame, *f).is_fixed() {
+                    return None;
+                }
+                let Value::Builtin(i) = graph.value(code, frame, *f) else { return self.tell_call(n) };
+                let builtin = code.builtins.get(*i);
+                let order = builtin.match_names(args.iter().map(|(k, _)| k.as_deref())).ok()?;
+                let argument = |i: &Option<usize>| match i.and_then(|i| args.get(i)) {
+                    Some((_, o)) => self.operand(frame, *o),
+                    None => Form::Fixed(Value::Unit),
+                };
+                let args = order.iter().map(argument).collect();
+                self.tape.call(builtin, args, &now)
+            }
+            Op::Call { .. } => self.tell_call(n),
+            Op::If { cond, .. } => {
+                self.guard(frame, *cond)?;
+                self.handed_on(n)
+            }
+            Op::Select { cond, .. } => {
+                self.guard(frame, *cond)?;
+                self.view.taken(n).map(|o| self.operand(frame, o))
+            }
+            Op::Fold { f, .. } => match self.operand(frame, *f).is_fixed() {
+                true => self.handed_on(n),
+                false => None,
+            },
+            Op::Map { f, .. } if !self.operand(frame, *f).is_fixed() => None,
+            // Its passes are told one by one.
+            Op::Map { .. } if matches!(side, Some(Side::Loop(_))) => Some(Form::Fixed(now)),
+            Op::Map { f, over, .. } => {
+                let Value::Builtin(i) = graph.value(code, frame, *f) else { return None };
+                let (over, builtin) = (self.operand(frame, *over), code.builtins.get(*i));
+                let one = |(i, now): (usize, Value)| self.tape.call(builtin, vec![over.position(i)?], &now);
+                match &now {
+                    Value::Record(r) => {
+                        let all = r.values().cloned().enumerate().map(one).collect::<Option<Vec<_>>>()?;
+                        Some(Form::Record(r.keys().cloned().zip(all).collect()))
+                    }
+                    v => {
+                        let all = v.passes().into_iter().enumerate().map(one).collect::<Option<Vec<_>>>()?;
+                        self.tape.array(all)
+                    }
+                }
+            }
+            Op::Draw { dist, keys, .. } => self.tell_draw(n, dist, keys),
+            Op::Observe { dist, value, .. } => {
+                let x = match graph.replaced(code, n) {
+                    Some(v) => Form::Fixed(v.clone()),
+                    None => self.operand(frame, *value),
+                };
+                self.tell_score(n, dist, &x, true)?;
+                Some(Form::Fixed(now))
+            }
+            Op::Factor { weight, .. } => {
+                let weight = self.operand(frame, *weight);
+                self.tape.factor(&weight)?;
+                Some(Form::Fixed(now))
+            }
+            // Loops over what moves, functions and containers whose structure hangs on it.
+            _ => None,
+        }
+    }
+
+    fn guard(&mut self, frame: FrameId, o: Operand) -> Option<()> {
+        let form = self.operand(frame, o);
+        self.tape.guard(&form, self.view.graph.value(self.view.code, frame, o))
+    }
+
+    /// A call of a function of the program, whose frame stays.
+    fn tell_call(&mut self, n: NodeId) -> Option<Form> {
+        match self.view.graph.nodes[n as usize].side.as_deref() {
+            Some(Side::MemoCall(c)) if c.deps.iter().any(|d| !self.form(*d).is_fixed()) => None,
+            _ => self.handed_on(n),
+        }
+    }
+
+    fn tell_gather(&mut self, n: NodeId, now: &Value) -> Option<Form> {
+        let all: Vec<Form> = self.view.gathered(n)?.iter().map(|d| self.form(*d)).collect();
+        match now {
+            Value::Record(r) => Some(Form::Record(r.keys().cloned().zip(all).collect())),
+            _ => self.tape.array(all),
+        }
+    }
+
+    fn tell_draw(&mut self, n: NodeId, spec: &DistSpec, keys: &[Operand]) -> Option<Form> {
+        let (graph, code) = (self.view.graph, self.view.code);
+        let frame = graph.nodes[n as usize].frame;
+        let dist = graph.dist_of(code, n)?;
+        // White noise is scored by itself, and the value moves with the parameters.
+        if dist.is_stored_whitened() || !self.operands(frame, keys).iter().all(Form::is_fixed) {
+            return None;
+        }
+        let params = self.operands(frame, spec.operands());
+        let moves = params.iter().any(|p| !p.is_fixed());
+        // A support that moves takes values along, or leaves them outside.
+        if moves && !has_fixed_support(&dist, &params) {
+            return None;
+        }
+        let x = match self.placed.get(&n) {
+            Some(form) => form.clone(),
+            None => Form::Fixed(graph.nodes[n as usize].value.clone()),
+        };
+        self.tell_score(n, spec, &x, false)?;
+        Some(x)
+    }
+
+    fn tell_score(&mut self, n: NodeId, spec: &DistSpec, x: &Form, observed: bool) -> Option<()> {
+        let (graph, code) = (self.view.graph, self.view.code);
+        let frame = graph.nodes[n as usize].frame;
+        match spec {
+            DistSpec::Family { builtin, args } => {
+                let dist = graph.make_dist(code, n, frame, spec, &mut Deps::new()).ok()?;
+                let args = self.operands(frame, args);
+                self.tape.family(code.builtins.get(*builtin), args, &dist, x, observed)
+            }
+            DistSpec::Value(o) => {
+                let form = self.operand(frame, *o);
+                self.tape.distribution(&form, graph.value(code, frame, *o), x, observed)
+            }
+        }
+    }
+}
+
+/// Whether a distribution whose parameters move has a support that stays.
+fn has_fixed_support(dist: &Dist, params: &[Form]) -> bool {
+    match dist {
+        d if !d.has_moving_support() => true,
+        Dist::HalfCauchy(_) => params.first().is_some_and(Form::is_fixed),
+        Dist::TruncatedNormal(_) => params.iter().skip(2).all(Form::is_fixed),
+        Dist::Product(d) => d.parts().iter().all(|one| has_fixed_support(one, params)),
+        _ => false,
+    }
+}
