@@ -43,7 +43,8 @@ impl Mixed {
                 if Categorical::new(&self.weights[..]).is_err() {
                     return false;
                 }
-                (self.total, self.log_shares) = Mixture::log_shares(&self.weights, std::mem::take(&mut self.log_shares));
+                (self.total, self.log_shares) =
+                    Mixture::log_shares(&self.weights, std::mem::take(&mut self.log_shares));
             }
         }
         self.parts.iter_mut().all(|(p, columns)| p.refresh(buffer, columns))

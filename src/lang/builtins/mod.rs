@@ -24,8 +24,8 @@ mod table;
 pub use args::Args;
 pub use covariance::CovarianceValue;
 pub(crate) use derivative::times;
-pub(crate) use reduce::dot;
 pub use derivative::{Binary, Derivative, Pull, Pulled, Reduction, Unary};
+pub(crate) use reduce::dot;
 pub use table::{Constant, Table};
 
 use super::error::Fault;

@@ -43,13 +43,10 @@ pub(super) const TABLE: &[Builtin] = &[
     of_all!("norm", 0, "The Euclidean length.", norm, |xs, y, by| {
         by.iter_mut().zip(xs).for_each(|(by, x)| *by = x / y)
     }),
-    of_all!(
-        "log_sum_exp",
-        0,
-        "`log(sum(exp(xs)))` without overflow; -inf of nothing.",
-        log_sum_exp,
-        |xs, y, by| by.iter_mut().zip(xs).for_each(|(by, x)| *by = libm::exp(x - y))
-    ),
+    of_all!("log_sum_exp", 0, "`log(sum(exp(xs)))` without overflow; -inf of nothing.", log_sum_exp, |xs, y, by| by
+        .iter_mut()
+        .zip(xs)
+        .for_each(|(by, x)| *by = libm::exp(x - y))),
     function("cumsum", SECTION, XS, Type::Array, "The running sums.", |a| {
         let mut total = 0.0;
         let running = |x: &f64| {

@@ -137,9 +137,8 @@ impl Builder {
 
     /// Pairs as the built-ins do: two arrays need equal lengths, anything else goes with every element.
     fn binary(&mut self, f: &'static Binary, x: &Form, y: &Form, now: &Value) -> Option<Form> {
-        let flat = |form: &Form| {
-            matches!(form, Form::Num(_) | Form::Array(..) | Form::Fixed(Value::Num(_) | Value::Array(_)))
-        };
+        let flat =
+            |form: &Form| matches!(form, Form::Num(_) | Form::Array(..) | Form::Fixed(Value::Num(_) | Value::Array(_)));
         if x.is_fixed() && y.is_fixed() {
             return Some(Form::Fixed(now.clone()));
         }
@@ -242,14 +241,7 @@ impl Builder {
     }
 
     /// The log density of a value under the distribution that a family gives for these arguments, which now is `dist`.
-    pub fn family(
-        &mut self,
-        builtin: &Builtin,
-        args: Vec<Form>,
-        dist: &Dist,
-        x: &Form,
-        observed: bool,
-    ) -> Option<()> {
+    pub fn family(&mut self, builtin: &Builtin, args: Vec<Form>, dist: &Dist, x: &Form, observed: bool) -> Option<()> {
         if x.is_fixed() && args.iter().all(Form::is_fixed) {
             return Some(());
         }

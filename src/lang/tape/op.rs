@@ -122,9 +122,7 @@ impl Op {
                 batch.pull(v, g, *x, params, *n, weight(*observed));
                 true
             }
-            Op::Score { dist, x, observed } => {
-                pull_score(dist, x, *observed, v, g, weight(*observed)).unwrap_or(false)
-            }
+            Op::Score { dist, x, observed } => pull_score(dist, x, *observed, v, g, weight(*observed)).unwrap_or(false),
             Op::Factor { x } => {
                 g[*x] += power;
                 true

@@ -64,8 +64,7 @@ impl Recording {
             return None;
         }
         let (new, old, none) = (self.tape.sums(), &self.start, &ExactSum::default());
-        let log_weight =
-            ExactSum::balance([&new.prior, &new.likelihood, none], [&old.prior, &old.likelihood, none]);
+        let log_weight = ExactSum::balance([&new.prior, &new.likelihood, none], [&old.prior, &old.likelihood, none]);
         Some(Weight {
             log_weight,
             log_joint: log_weight,

@@ -68,8 +68,8 @@ impl<'a> System<'a> {
             return Ok(None);
         }
         let layout = Arc::new(layout);
-        let taped = memory.record(trace, &layout, &mut point.y)
-            && memory.gradient(&point.y, at.power, &mut point.gradient);
+        let taped =
+            memory.record(trace, &layout, &mut point.y) && memory.gradient(&point.y, at.power, &mut point.gradient);
         let mut system = System { trace, at, memory, layout, taped, jacobian: jacobian.value() };
         if !taped {
             system.memory.give_up();
@@ -103,7 +103,9 @@ impl<'a> System<'a> {
         if point.y.iter().any(|x| !x.is_finite()) {
             return Ok(false);
         }
-        if self.taped && let Some(w) = self.memory.weigh(&point.y) {
+        if self.taped
+            && let Some(w) = self.memory.weigh(&point.y)
+        {
             point.log_density = self.at.tempered(&w) + w.log_jacobian - self.jacobian;
             if !point.log_density.is_finite() {
                 return Ok(false);
