@@ -10,6 +10,7 @@ use crate::num::accumulate;
 use crate::trace::demand::Failure;
 use crate::trace::node::*;
 use smallvec::SmallVec;
+use std::cmp::Ordering;
 
 impl Reverse<'_> {
     /// The nodes that the score of a choice, observation or factor is computed from, but for the choice itself.
@@ -103,27 +104,17 @@ impl Reverse<'_> {
                 let builtin = self.code.builtins.get(*builtin);
                 let values = self.values(frame, args);
                 let mut pulled = by_arguments(&Args { builtin, values: &values }, dist, &params);
-                pulled
-                    .iter_mut()
-                    .enumerate()
-                    .filter(|(i, _)| is_matrix(dist, *i))
-                    .for_each(|(_, p)| *p = Adjoint::Zero);
+                if let Some(p) = matrix_argument(dist, &values).and_then(|i| pulled.get_mut(i)) {
+                    *p = Adjoint::Zero;
+                }
                 self.give_arguments(n, builtin, args.iter().map(|o| Some(*o)), pulled)?;
             }
         }
         Ok(())
     }
-}
 
-/// What [`Reverse::give_matrix`] is about: the argument with a covariance.
-enum Matrix {
-    Kernel,
-    Covariance,
-    Factor,
-}
-
-impl Reverse<'_> {
-    /// Hands the derivatives by a covariance, `weight` times, to what it was computed from; [`by_arguments`] leaves it out.
+    /// Hands the derivatives by a covariance or a factor of one, `weight` times, to what it was computed from; [`by_arguments`]
+    /// leaves it out.
     pub(super) fn give_matrix(
         &mut self,
         n: NodeId,
@@ -133,38 +124,108 @@ impl Reverse<'_> {
         by_value: &[f64],
         weight: f64,
     ) -> Result<(), Failure> {
-        let DistSpec::Family { builtin, args } = spec else { return Ok(()) };
         let frame = self.graph.nodes[n as usize].frame;
-        let values = self.values(frame, args);
-        let (i, which) = match (dist, values.get(1)) {
-            (Dist::Gp(_), _) => (1, Matrix::Kernel),
-            (Dist::MvNormal(_), Some(Value::Unit)) => (2, Matrix::Factor),
-            (Dist::MvNormal(_), _) => (1, Matrix::Covariance),
-            _ => return Ok(()),
+        let values = self.values(frame, spec.operands());
+        let i = match spec {
+            DistSpec::Value(_) => matrix_argument(dist, &[]).map(|_| 0),
+            DistSpec::Family { .. } => matrix_argument(dist, &values),
         };
-        let Some(source) = args.get(i).and_then(|o| self.source(frame, *o)).filter(|s| self.is_active(*s)) else {
-            return Ok(());
+        let source = i.and_then(|i| spec.operands().get(i)).and_then(|o| self.source(frame, *o));
+        let Some(source) = source.filter(|s| self.is_active(*s)) else { return Ok(()) };
+        let Some(mut by) = by_factor(dist, stored, by_value) else {
+            return Err(self.no_matrix(n, dist));
         };
-        let a = Args { builtin: self.code.builtins.get(*builtin), values: &values };
-        let found = match (dist, which) {
-            (Dist::Gp(d), _) => {
-                let cov = values.get(1).and_then(|v| v.downcast::<CovarianceValue>());
-                let at = a.array(2).ok();
-                let by = cov.zip(at).and_then(|(c, at)| d.covariance_gradient(&c.0, &at, stored, by_value));
-                by.map(Adjoint::Array)
+        by.iter_mut().for_each(|g| *g *= weight);
+        let by = match spec {
+            // Behind the parameters: what makes the distribution takes them apart.
+            DistSpec::Value(_) => {
+                let mut all = vec![0.0; dist.param_count()];
+                all.append(&mut by);
+                Some(Adjoint::Array(all))
             }
-            (Dist::MvNormal(d), which) => {
-                let rows = d.matrix_gradient(matches!(which, Matrix::Factor), stored, by_value);
-                rows.map(|rows| Adjoint::List(rows.into_iter().map(Adjoint::Array).collect()))
+            DistSpec::Family { builtin, .. } => {
+                by_matrix(&Args { builtin: self.code.builtins.get(*builtin), values: &values }, dist, &by)
             }
-            _ => None,
         };
-        let Some(mut by) = found else {
-            return Err(self.no_derivative(n, &format!("the covariance of `{}`", dist.name())));
-        };
-        scale(&mut by, weight);
+        let Some(by) = by else { return Err(self.no_matrix(n, dist)) };
         self.give_node(source, by);
         Ok(())
+    }
+
+    /// The adjoints of the arguments of a distribution that is a value: its parameters, and behind them the factor of its
+    /// covariance. `wanted` says whether an argument leads anywhere.
+    pub(super) fn by_distribution(
+        &self,
+        n: NodeId,
+        a: &Args,
+        dist: &Dist,
+        by: &Adjoint,
+        wanted: impl Fn(usize) -> bool,
+    ) -> Result<SmallVec<[Adjoint; 4]>, Failure> {
+        let all = by.numbers(if let Adjoint::Array(gs) = by { gs.len() } else { 0 });
+        let Some(i) = matrix_argument(dist, a.values) else { return Ok(by_arguments(a, dist, &all)) };
+        let (params, factor) = all.split_at(dist.param_count().min(all.len()));
+        let mut pulled = by_arguments(a, dist, params);
+        if let Some(p) = pulled.get_mut(i) {
+            *p = match factor {
+                _ if !wanted(i) => Adjoint::Zero,
+                // Within a distribution of several, such as `iid`, which hands out parameters only.
+                [] => Adjoint::Unknown,
+                _ => by_matrix(a, dist, factor).ok_or_else(|| self.no_matrix(n, dist))?,
+            };
+        }
+        Ok(pulled)
+    }
+
+    fn no_matrix(&self, n: NodeId, dist: &Dist) -> Failure {
+        self.no_derivative(n, &format!("the covariance of `{}`", dist.name()))
+    }
+}
+
+/// The argument that is a covariance or a factor of one, whose derivatives come by another way: [`Reverse::give_matrix`].
+fn matrix_argument(dist: &Dist, values: &[&Value]) -> Option<usize> {
+    match (dist, values.get(1)) {
+        (Dist::MvNormal(_), Some(Value::Unit)) => Some(2),
+        (Dist::Gp(_) | Dist::MvNormal(_) | Dist::Wishart(_), _) => Some(1),
+        _ => None,
+    }
+}
+
+/// The derivatives by the Cholesky factor of a distribution's covariance, its lower triangle by rows: of the log density of a
+/// stored value; of one stored as noise, of what has these derivatives by the value.
+fn by_factor(dist: &Dist, stored: &Datum, by_value: &[f64]) -> Option<Vec<f64>> {
+    match dist {
+        Dist::Gp(d) => d.factor_gradient(stored, by_value),
+        Dist::MvNormal(d) => d.factor_gradient(stored, by_value),
+        Dist::Wishart(d) => d.scale_gradient(stored),
+        _ => None,
+    }
+}
+
+/// From those to the derivatives by the argument the factor was made from, in its shape.
+fn by_matrix(a: &Args, dist: &Dist, by_factor: &[f64]) -> Option<Adjoint> {
+    // An entry off the diagonal of a covariance stands for two places, one of a factor for one.
+    let rows = |by: &[f64], above: f64| {
+        let n = (0..).find(|n| n * (n + 1) / 2 >= by.len()).unwrap_or(0);
+        let cell = |i: usize, j: usize| {
+            let (row, column) = (i.max(j), i.min(j));
+            let share = match i.cmp(&j) {
+                Ordering::Equal => 1.0,
+                Ordering::Less => above,
+                Ordering::Greater => 1.0 - above,
+            };
+            by.get(row * (row + 1) / 2 + column).map_or(0.0, |g| g * share)
+        };
+        Adjoint::List((0..n).map(|i| Adjoint::Array((0..n).map(|j| cell(i, j)).collect())).collect())
+    };
+    match dist {
+        Dist::Gp(d) => {
+            let cov = a.get(1).downcast::<CovarianceValue>()?;
+            Some(Adjoint::Array(d.pull_covariance(&cov.0, &a.array(2).ok()?, by_factor)?))
+        }
+        Dist::MvNormal(d) if !matches!(a.get(1), Value::Unit) => Some(rows(&d.pull_covariance(by_factor), 0.5)),
+        Dist::MvNormal(_) | Dist::Wishart(_) => Some(rows(by_factor, 0.0)),
+        _ => None,
     }
 }
 
@@ -253,7 +314,7 @@ pub(super) fn by_arguments(a: &Args, dist: &Dist, params: &[f64]) -> SmallVec<[A
     };
     let one = |i: usize| -> Adjoint {
         match a.get(i) {
-            _ if is_matrix(dist, i) => Adjoint::Unknown,
+            _ if matrix_argument(dist, a.values) == Some(i) => Adjoint::Unknown,
             Value::Num(_) if dist.name() == "gp" => {
                 Adjoint::Num(take(params.len()).map_or(0.0, |all| all.iter().sum()))
             }
@@ -272,9 +333,4 @@ pub(super) fn by_arguments(a: &Args, dist: &Dist, params: &[f64]) -> SmallVec<[A
         }
     };
     (0..count).map(one).collect()
-}
-
-/// Whether an argument is a covariance, whose derivatives come by another way: [`Reverse::give_matrix`].
-fn is_matrix(dist: &Dist, i: usize) -> bool {
-    matches!((dist, i), (Dist::Gp(_), 1) | (Dist::MvNormal(_), 1 | 2))
 }
