@@ -268,8 +268,12 @@ fn covariances_of_distributions_as_values() {
         for p in [
             format!("let d = {d}; observe d = [0.3, 0.4, 1];"),
             format!("let d = {d}; assume x ~ d; observe normal(x, 0.5) = [1, 2, 0];"),
-            format!("assume c ~ flip(0.5); let d = if c {{ {d} }} else {{ iid(normal(m, s), 3) }}; observe d = [1, 2, 0];"),
-            format!("fn make(a) {{ a }} let d = make({d}); assume x ~ d; observe d = [1, 2, 0]; observe normal(x, 1) = [1, 1, 0];"),
+            format!(
+                "assume c ~ flip(0.5); let d = if c {{ {d} }} else {{ iid(normal(m, s), 3) }}; observe d = [1, 2, 0];"
+            ),
+            format!(
+                "fn make(a) {{ a }} let d = make({d}); assume x ~ d; observe d = [1, 2, 0]; observe normal(x, 1) = [1, 1, 0];"
+            ),
         ] {
             check(&format!("{of} {p}"));
         }
@@ -278,7 +282,10 @@ fn covariances_of_distributions_as_values() {
         let whitened = d.replace("mv_normal(", "mv_normal(whitened = true, mean = ");
         check(&format!("{of} let d = {whitened}; assume x ~ d; observe normal(x, 0.5) = [1, 2, 0];"));
     }
-    check(&format!("{of} assume x ~ {}; observe normal(x, 0.5) = [1, 2, 0];", gp.replace("gp(", "gp(centred = true, ")));
+    check(&format!(
+        "{of} assume x ~ {}; observe normal(x, 0.5) = [1, 2, 0];",
+        gp.replace("gp(", "gp(centred = true, ")
+    ));
     check(&format!("{of} let ds = [{gp}, {chol}]; observe ds[1] = [1, 2, 0]; observe ds[0] = [0.1, 0.2, 1.1];"));
 }
 
@@ -288,7 +295,9 @@ fn wishart_by_its_scale() {
     let scale = "[[a, 0, 0], [b, 1 + a, 0], [0.3 * b, a * b, 0.7]]";
     for p in [
         format!("assume w ~ wishart(4.5, {scale}); observe normal(w[1][0] + w[2][2], 1) = 0.5;"),
-        format!("let d = wishart(3 + a, {scale}); assume w ~ d; observe mv_normal([0, b, 1], chol = w) = [0.3, 0.1, 1];"),
+        format!(
+            "let d = wishart(3 + a, {scale}); assume w ~ d; observe mv_normal([0, b, 1], chol = w) = [0.3, 0.1, 1];"
+        ),
         format!("observe wishart(4 + a, {scale}) = [[1, 0, 0], [0.4, 1.2, 0], [-0.3, 0.1, 0.5]];"),
         "observe wishart(2 + a, [[a]]) = [[0.8]];".to_owned(),
     ] {

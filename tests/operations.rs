@@ -125,9 +125,8 @@ fn drawn_branches_are_importance_weighted() {
     );
     t.set("@c", false, draws(0)).unwrap();
     let n = 20_000;
-    let weights: Vec<f64> = (0..n)
-        .map(|step| t.update(&given(&[("@c", true.into())]), draws(step)).unwrap().log_weight.exp())
-        .collect();
+    let weights: Vec<f64> =
+        (0..n).map(|step| t.update(&given(&[("@c", true.into())]), draws(step)).unwrap().log_weight.exp()).collect();
     let expected = 0.3 * normal_pdf(0.8, 1.0, 5f64.sqrt()) / (0.7 * normal_pdf(0.8, 0.5, 1.0));
     let (mean, sd) = (common::mean(&weights), common::variance(&weights).sqrt());
     assert!((mean - expected).abs() < 5.0 * sd / (n as f64).sqrt() && sd < expected, "{mean} for {expected}");

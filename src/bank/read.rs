@@ -3,8 +3,8 @@
 use super::format::{Header, Preamble, START};
 use super::record::{decode, latents};
 use super::{BankError, Named};
-use crate::num::fnv1a;
 use crate::infer::Neighbours;
+use crate::num::fnv1a;
 use crate::vision::features::Query;
 use std::fs::File;
 use std::io::{Read, Seek, SeekFrom};

@@ -99,7 +99,8 @@ impl BankWriter {
         let at = self.end + table.len() as u64;
         self.put(self.end, &table)?;
         self.put(at, &text)?;
-        let preamble = Preamble { count: self.count, width: self.width, table: self.end, header: at, hash: fnv1a(&text) };
+        let preamble =
+            Preamble { count: self.count, width: self.width, table: self.end, header: at, hash: fnv1a(&text) };
         self.put(0, &preamble.encode())?;
         std::fs::rename(&self.partial, &self.path)?;
         self.done = true;

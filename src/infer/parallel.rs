@@ -4,7 +4,11 @@ use rayon::prelude::*;
 
 /// Does the same with each of some things, on so many threads (0: as many as there are cores), one at a time where no threads can
 /// be had; results in order.
-pub(crate) fn in_parallel<I: Send, T: Send>(threads: usize, items: Vec<I>, one: impl Fn(I) -> T + Sync + Send) -> Vec<T> {
+pub(crate) fn in_parallel<I: Send, T: Send>(
+    threads: usize,
+    items: Vec<I>,
+    one: impl Fn(I) -> T + Sync + Send,
+) -> Vec<T> {
     match rayon::ThreadPoolBuilder::new().num_threads(threads).build() {
         Ok(pool) => pool.install(|| items.into_par_iter().with_max_len(1).map(one).collect()),
         Err(_) => items.into_iter().map(one).collect(),

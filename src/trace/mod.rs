@@ -148,7 +148,9 @@ impl Trace {
         self.graph.constraints.extend(constraints.iter().cloned());
         self.put_observed(observed);
         let spread = match changes {
-            [(target, change)] if observed.is_empty() => self.graph.spread_of(&self.code, *target).map(|s| (*target, change, s)),
+            [(target, change)] if observed.is_empty() => {
+                self.graph.spread_of(&self.code, *target).map(|s| (*target, change, s))
+            }
             _ => None,
         };
         let settled = match spread {

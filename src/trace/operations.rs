@@ -3,38 +3,6 @@
 //!
 //! Terms are Gen's (Cusumano-Towner et al. 2019): [`Trace::update`], [`Trace::project`]; `simulate`, `generate`, `propose`,
 //! `regenerate` and `score` are beside them, and a fork of a trace is its clone. Not here: how an update runs.
-//!
-//! ```
-//! use pcadlang::Model;
-//! use pcadlang::lang::value::Value;
-//! use pcadlang::rng::{Purpose, StreamKey};
-//! use pcadlang::trace::{Draws, Selector};
-//! # fn main() -> Result<(), Box<dyn std::error::Error>> {
-//! let model = Model::from_text(
-//!     "assume spare ~ flip(0.2);
-//!      assume x = if spare { a ~ normal(0, 1); a } else { 3 };
-//!      observe normal(x, 1) = 2.5 as y;",
-//! )?;
-//! let mut trace = model.simulate(1, 0)?;
-//! let draws = Draws { key: StreamKey::new(1, 0, Purpose::VALUES), step: 0, lane: 0 };
-//!
-//! // Another branch, a value for the choice that appears in it, other data: one update, and back.
-//! trace.set("@spare", false, draws)?;
-//! let before = trace.log_joint();
-//! let given = [("@spare".parse()?, true.into()), ("@x/a".parse()?, 1.5.into()), ("@y".parse()?, 2.0.into())];
-//! let there = trace.update(&given, draws)?;
-//! trace.commit();
-//! assert!(matches!(trace.get("@x/a")?, Value::Num(1.5)));
-//! let back = trace.update(&there.discarded, draws)?;
-//! assert_eq!(back.log_weight, -there.log_weight);
-//! assert_eq!(trace.log_joint().to_bits(), before.to_bits());
-//! trace.commit();
-//!
-//! assert_eq!(trace.project(&Selector::All), trace.log_joint());
-//! assert!(trace.get("@spar").unwrap_err().to_string().contains("did you mean `@spare`?"));
-//! # Ok(())
-//! # }
-//! ```
 
 use super::node::NodeId;
 use super::{Address, Change, Constraint, Draws, Selector, Target, Trace, TraceResult, Weight};
@@ -119,6 +87,38 @@ impl Trace {
     /// appears, and choices that appear without one are drawn from their prior. Gaussian processes keep the noise behind them
     /// where their parameters change. The update is pending until [`Trace::commit`] or [`Trace::rollback`]; there is a way back
     /// also after that ([`Update::discarded`]), bit for bit.
+    ///
+    /// ```
+    /// use pcadlang::Model;
+    /// use pcadlang::lang::value::Value;
+    /// use pcadlang::rng::{Purpose, StreamKey};
+    /// use pcadlang::trace::{Draws, Selector};
+    /// # fn main() -> Result<(), Box<dyn std::error::Error>> {
+    /// let model = Model::from_text(
+    ///     "assume spare ~ flip(0.2);
+    ///      assume x = if spare { a ~ normal(0, 1); a } else { 3 };
+    ///      observe normal(x, 1) = 2.5 as y;",
+    /// )?;
+    /// let mut trace = model.simulate(1, 0)?;
+    /// let draws = Draws { key: StreamKey::new(1, 0, Purpose::VALUES), step: 0, lane: 0 };
+    ///
+    /// // Another branch, a value for the choice that appears in it, other data: one update, and back.
+    /// trace.set("@spare", false, draws)?;
+    /// let before = trace.log_joint();
+    /// let given = [("@spare".parse()?, true.into()), ("@x/a".parse()?, 1.5.into()), ("@y".parse()?, 2.0.into())];
+    /// let there = trace.update(&given, draws)?;
+    /// trace.commit();
+    /// assert!(matches!(trace.get("@x/a")?, Value::Num(1.5)));
+    /// let back = trace.update(&there.discarded, draws)?;
+    /// assert_eq!(back.log_weight, -there.log_weight);
+    /// assert_eq!(trace.log_joint().to_bits(), before.to_bits());
+    /// trace.commit();
+    ///
+    /// assert_eq!(trace.project(&Selector::All), trace.log_joint());
+    /// assert!(trace.get("@spar").unwrap_err().to_string().contains("did you mean `@spare`?"));
+    /// # Ok(())
+    /// # }
+    /// ```
     ///
     /// # Errors
     /// If an address is not in the updated trace (the message names the nearest one that is), if a value does not fit its

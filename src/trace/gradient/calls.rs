@@ -40,8 +40,7 @@ impl Reverse<'_> {
         let value = |o: &Option<Operand>| o.map_or(&Value::Unit, |o| g.plain(self.code, frame, o, &mut deps));
         let values: SmallVec<[&Value; 8]> = operands.iter().map(value).collect();
         let operand = |i: usize| operands.get(i).copied().flatten();
-        let pulled =
-            self.by_call(n, &Args { builtin, values: &values }, &g.nodes[n as usize].value, by, operand)?;
+        let pulled = self.by_call(n, &Args { builtin, values: &values }, &g.nodes[n as usize].value, by, operand)?;
         self.give_arguments(n, builtin, operands, pulled)?;
         Ok(true)
     }
