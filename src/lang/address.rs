@@ -1,7 +1,7 @@
 //! Addresses: the path that leads to a random choice or observation, as a value and as text.
 //!
 //! What an address prints as reads back as the same address, but for keys that are arrays of one element or of arrays, which
-//! print as their elements. Not here: patterns with wildcards (`crate::trace::Pattern`), and the address literals of programs.
+//! print as their elements. Not here: patterns with wildcards, and the address literals of programs.
 
 use super::code::segment_hash;
 use super::key::{Key, mix};
