@@ -1,11 +1,13 @@
-//! What a step costs: one transition of a regression with 10 and with 10,000 points, and one evaluation of the contour
-//! likelihood of `lathe.pcad` at 128 pixels.
+//! What a step costs: one transition of a regression with 10 and with 10,000 points, one update of a choice that reaches one
+//! point among 10 to 100,000, one sweep over such choices, one gradient, and one evaluation of the contour likelihood of
+//! `lathe.pcad` at 128 pixels. `cargo bench --bench engine -- update` runs those with a name.
 
 use criterion::{Criterion, criterion_group, criterion_main};
 use pcadlang::dist::Datum;
-use pcadlang::infer::{At, Drift, Kernel, Mh, Pick, Scope};
+use pcadlang::infer::{At, Drift, Gibbs, Kernel, Mh, Pick, Scope};
+use pcadlang::lang::value::Value;
 use pcadlang::rng::{Purpose, StreamKey};
-use pcadlang::trace::{Address, AddressSegment, Change, Draws, Selector, Trace};
+use pcadlang::trace::{Change, ChoiceKind, Draws, Selector, Trace};
 use pcadlang::{Model, Program};
 use std::hint::black_box;
 
@@ -29,8 +31,15 @@ fn draws(step: u64) -> Draws {
     Draws { key: StreamKey::new(1, 0, Purpose::VALUES), step, lane: 0 }
 }
 
-fn target(name: &str) -> Address {
-    Address { segments: vec![AddressSegment { name: name.into(), occurrence: 1, keys: Vec::new() }] }
+/// Steps a kernel.
+fn steps(c: &mut Criterion, what: &str, trace: &mut Trace, kernel: &mut dyn Kernel) {
+    let mut step = 0;
+    c.bench_function(what, |b| {
+        b.iter(|| {
+            step += 1;
+            kernel.step(trace, &At::new(1, 0, step)).map(|o| o.accepted).unwrap_or_default()
+        });
+    });
 }
 
 fn transitions(c: &mut Criterion) {
@@ -42,22 +51,92 @@ fn transitions(c: &mut Criterion) {
                 [("mh", Box::new(Mh::new(scope()))), ("drift", Box::new(Drift::new(scope(), Some(0.1))))];
             for (name, mut kernel) in kernels {
                 let mut trace = model.simulate(1, 0).unwrap_or_else(|e| panic!("{e}"));
-                let mut step = 0;
-                c.bench_function(&format!("linreg n={n} {how}: one {name} transition"), |b| {
-                    b.iter(|| {
-                        step += 1;
-                        let at = At::new(1, 0, step);
-                        kernel.step(&mut trace, &at).map(|o| o.accepted).unwrap_or_default()
-                    });
-                });
+                steps(c, &format!("linreg n={n} {how}: one {name} transition"), &mut trace, &mut *kernel);
             }
         }
     }
 }
 
+/// A shipped model of the comparison with other languages: a flag for each point says whether it is an outlier.
+fn flags(n: usize) -> Trace {
+    let text = include_str!("peers/linreg.pcad");
+    let text = text.split("infer {").next().unwrap_or(text);
+    let at = |i: usize| ((i * 7919) % 1000) as f64 / 1000.0;
+    let array = |f: &dyn Fn(usize) -> f64| Value::Array((0..n).map(f).collect());
+    let model = Program::parse(text)
+        .map(|p| p.observe("x", array(&|i| -5.0 + 10.0 * at(i))).observe("y", array(&|i| 7.0 - 10.0 * at(i))))
+        .and_then(Program::compile)
+        .unwrap_or_else(|e| panic!("{e}"));
+    model.simulate(1, 0).unwrap_or_else(|e| panic!("{e}"))
+}
+
+/// One choice that reaches one of n points.
+fn update(c: &mut Criterion) {
+    let scope = || Scope { selector: Selector::Kind(ChoiceKind::Discrete), pick: Pick::One };
+    for n in [10, 1_000, 100_000] {
+        let mut trace = flags(n);
+        steps(c, &format!("update: mh of a flag, n={n}"), &mut trace, &mut Mh::new(scope()));
+        steps(c, &format!("update: gibbs of a flag, n={n}"), &mut trace, &mut Gibbs::new(scope()));
+    }
+}
+
+/// Every one of n such choices, one after the other.
+fn sweep(c: &mut Criterion) {
+    let scope = Scope { selector: Selector::Kind(ChoiceKind::Discrete), pick: Pick::Each };
+    for n in [10, 1_000] {
+        let mut trace = flags(n);
+        let mut kernel = Gibbs::new(scope.clone());
+        let mut step = 0;
+        c.bench_function(&format!("sweep: gibbs of each of {n} flags"), |b| {
+            b.iter(|| {
+                let count = kernel.sweep(&mut trace).unwrap_or(1);
+                for member in 0..count {
+                    step += 1;
+                    let moved = kernel.step(&mut trace, &At { member, ..At::new(1, 0, step) });
+                    black_box(moved.map(|o| o.accepted).unwrap_or_default());
+                }
+            });
+        });
+    }
+}
+
+/// A number or arrays of them.
+fn value(j: &serde_json::Value) -> Value {
+    match j.as_array() {
+        Some(xs) => Value::from_elements(xs.iter().map(value).collect()),
+        None => Value::Num(j.as_f64().unwrap_or_default()),
+    }
+}
+
+/// One gradient of the log joint density by all continuous choices, in a draw from the prior.
+fn gradient(c: &mut Criterion) {
+    for (name, what) in [
+        ("eight_schools", "schools, 10 coordinates"),
+        ("gp_regr", "a Gaussian process at 11 points"),
+        ("kidscore_momiq", "a regression with 434 points"),
+    ] {
+        let file = |ending: &str| format!("{}/tests/posteriordb/{name}.{ending}", env!("CARGO_MANIFEST_DIR"));
+        let read = |ending: &str| std::fs::read_to_string(file(ending)).unwrap_or_else(|e| panic!("{name}: {e}"));
+        let json: serde_json::Value = serde_json::from_str(&read("json")).unwrap_or_else(|e| panic!("{name}: {e}"));
+        let program = Program::parse(&read("pcad")).unwrap_or_else(|e| panic!("{e}"));
+        let items = program.interface().data;
+        let program = items.iter().fold(program, |p, d| p.observe(&d.name, value(&json["data"][&*d.name])));
+        let model = program.compile().unwrap_or_else(|e| panic!("{e}"));
+        let trace = model.simulate(1, 0).unwrap_or_else(|e| panic!("{e}"));
+        let (targets, mut out) = (trace.all_targets().to_vec(), Vec::new());
+        c.bench_function(&format!("gradient: {what}"), |b| {
+            b.iter(|| {
+                out.clear();
+                let done = trace.gradient(&targets, 1.0, &mut out).is_ok();
+                black_box((done, out.last().copied()))
+            });
+        });
+    }
+}
+
 /// Proposes values that wander a little, so that everything that depends on the choice runs again.
 fn wander(c: &mut Criterion, what: &str, trace: &mut Trace, name: &str, around: f64) {
-    let Some(target) = trace.find(&target(name)) else { panic!("no choice {name}") };
+    let Some(target) = name.parse().ok().and_then(|a| trace.find(&a)) else { panic!("no choice {name}") };
     let mut step = 0u64;
     c.bench_function(what, |b| {
         b.iter(|| {
@@ -80,21 +159,9 @@ fn likelihood(c: &mut Criterion) {
         .and_then(Program::compile)
         .unwrap_or_else(|e| panic!("{e}"));
     let mut trace = model.simulate(3, 0).unwrap_or_else(|e| panic!("{e}"));
-    wander(c, "lathe at 128: new profile, contours, likelihood", &mut trace, "H", 1.8);
-    let shift = trace.choices().into_iter().find(|(a, ..)| a.to_string() == "@S_L/place/t[x]").map(|(a, ..)| a);
-    let Some(shift) = shift.and_then(|a| trace.find(&a)) else { panic!("no shift") };
-    let mut step = 0u64;
-    c.bench_function("lathe at 128: new pose, contours, likelihood", |b| {
-        b.iter(|| {
-            step += 1;
-            let x = 1e-3 * (step % 97) as f64;
-            let weight = trace.propose(&[(shift, Change::Set(Datum::Num(x)))], draws(step));
-            let weight = black_box(weight.map(|w| w.log_weight));
-            trace.rollback();
-            weight.is_ok()
-        });
-    });
+    wander(c, "lathe at 128: new profile, contours, likelihood", &mut trace, "@H", 1.8);
+    wander(c, "lathe at 128: new pose, contours, likelihood", &mut trace, "@S_L/place/t[x]", 0.0);
 }
 
-criterion_group!(benches, transitions, likelihood);
+criterion_group!(benches, transitions, update, sweep, gradient, likelihood);
 criterion_main!(benches);

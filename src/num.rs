@@ -1,8 +1,9 @@
-//! Arithmetic that densities rest on: exact sums, stable functions in log space. All through `libm`, so that results are the
+//! Arithmetic that densities rest on: exact sums, stable functions in log space, a hash. All through `libm`, so that results are the
 //! same on every platform.
 
 mod column;
 mod exact;
+mod hash;
 mod incomplete;
 mod saddle;
 mod special;
@@ -10,6 +11,7 @@ mod tails;
 
 pub use column::Column;
 pub use exact::ExactSum;
+pub use hash::fnv1a;
 pub use incomplete::{chi_square_tail, upper_gamma};
 pub use saddle::{deviance, stirling_error};
 pub use special::{

@@ -7,7 +7,7 @@
 mod common;
 use common::*;
 use pcadlang::Model;
-use pcadlang::infer::{Banks, Latent, Neighbours, RunOptions};
+use pcadlang::infer::{Banks, RunOptions};
 use std::sync::Arc;
 
 /// A model, the cells its states are sorted into, and the posterior mass of each.
@@ -66,24 +66,55 @@ const STRUCTURE: Case = Case {
     },
 };
 
-/// The same address in both branches, with supports of different shape.
-const SHARED: Case = Case {
-    name: "shared address",
+/// The text of a model in which x is beta or gamma as c has it, and the masses of c and where x is.
+const BETA_OR_GAMMA: fn() -> Vec<f64> = || {
+    let beta = |x: f64| if x > 0.0 && x < 1.0 { 12.0 * x * (1.0 - x) * (1.0 - x) } else { 0.0 };
+    let gamma = |x: f64| x * (-x).exp();
+    let cell = |lo: f64, hi: f64, c: bool| {
+        let f = |x: f64| if c { 0.4 * beta(x) } else { 0.6 * gamma(x) } * normal_pdf(0.8, x, 0.5);
+        integrate(f, lo, hi, 2000)
+    };
+    let parts = |c: bool| [(0.0, 0.4), (0.4, 0.8), (0.8, if c { 1.0 } else { 9.0 })].map(|(a, b)| cell(a, b, c));
+    normalised([parts(false), parts(true)].concat())
+};
+
+fn beta_or_gamma(d: &Draws, i: usize) -> usize {
+    d["c"][i] as usize * 3 + bin(d["x"][i], &[0.4, 0.8])
+}
+
+/// The same name in both branches: two addresses, `@x/a` and `@x/a#2`, of which there is always one.
+const SAME_NAME: Case = Case {
+    name: "same name",
     text: "assume c ~ flip(0.4);
            assume x = if c { a ~ beta(2, 3); a } else { a ~ gamma(2, 1); a };
            observe normal(x, 0.5) = 0.8;",
     collect: "c, x",
-    cell: |d, i| d["c"][i] as usize * 3 + bin(d["x"][i], &[0.4, 0.8]),
-    mass: || {
-        let beta = |x: f64| if x > 0.0 && x < 1.0 { 12.0 * x * (1.0 - x) * (1.0 - x) } else { 0.0 };
-        let gamma = |x: f64| x * (-x).exp();
-        let cell = |lo: f64, hi: f64, c: bool| {
-            let f = |x: f64| if c { 0.4 * beta(x) } else { 0.6 * gamma(x) } * normal_pdf(0.8, x, 0.5);
-            integrate(f, lo, hi, 2000)
-        };
-        let parts = |c: bool| [(0.0, 0.4), (0.4, 0.8), (0.8, if c { 1.0 } else { 9.0 })].map(|(a, b)| cell(a, b, c));
-        normalised([parts(false), parts(true)].concat())
-    },
+    cell: beta_or_gamma,
+    mass: BETA_OR_GAMMA,
+};
+
+/// The same address in both states of c, by way of two functions that are called at one place: one choice goes and another of
+/// another support comes, at `@x/f/a` both.
+const SHARED: Case = Case {
+    name: "shared address",
+    text: "assume c ~ flip(0.4);
+           let f = if c { fn() { a ~ beta(2, 3); a } } else { fn() { a ~ gamma(2, 1); a } };
+           assume x = f();
+           observe normal(x, 0.5) = 0.8;",
+    collect: "c, x",
+    cell: beta_or_gamma,
+    mass: BETA_OR_GAMMA,
+};
+
+/// One choice whose support moves with another: what is outside of it there has density zero.
+const MOVING: Case = Case {
+    name: "moving support",
+    text: "assume c ~ flip(0.4); let d = if c { beta(2, 3) } else { gamma(2, 1) };
+           assume x ~ d;
+           observe normal(x, 0.5) = 0.8;",
+    collect: "c, x",
+    cell: beta_or_gamma,
+    mass: BETA_OR_GAMMA,
 };
 
 /// The values that k can take depend on n; with n = 0 there is only one.
@@ -193,13 +224,6 @@ const COUNTS: Case = Case {
     },
 };
 
-/// Three draws from the prior, which have nothing to do with the data: neighbours that mislead.
-fn wrong_neighbours(text: &str) -> Neighbours {
-    let model = Model::from_text(text).unwrap();
-    let draw = |i| Latent::all(&model.simulate(9, i).unwrap());
-    Neighbours::new((0..3).map(draw).collect(), &(3..40).map(draw).collect::<Vec<_>>())
-}
-
 /// Runs a kernel for long and judges it.
 fn balanced(case: &Case, kernel: &str, steps: usize) {
     let what = format!("{}, {kernel}", case.name);
@@ -208,7 +232,7 @@ fn balanced(case: &Case, kernel: &str, steps: usize) {
         "{} infer {{ repeat 300 {{ {stmt} }} repeat {steps} {{ {stmt} collect {}; }} }}",
         case.text, case.collect
     );
-    let banks: Arc<dyn Banks> = Arc::new(wrong_neighbours(case.text));
+    let banks: Arc<dyn Banks> = Arc::new(wrong_neighbours(&Model::from_text(case.text).unwrap()));
     let options = RunOptions { seed: 101, banks: Some(banks), ..RunOptions::default() };
     let d = run_with(&text, &options, 1, 1);
     let states: Vec<usize> = (0..steps).map(|i| (case.cell)(&d, i)).collect();
@@ -250,8 +274,25 @@ fn choices_that_appear_and_vanish() {
 }
 
 #[test]
+fn one_name_in_two_branches() {
+    all_balanced(&SAME_NAME, 20_000, kernels::balance::SAME_NAME);
+}
+
+#[test]
 fn one_address_in_two_branches() {
+    let model = Model::from_text(SHARED.text).unwrap();
+    for c in [true, false] {
+        let mut trace = model.simulate(1, 0).unwrap();
+        trace.set("@c", c, Default::default()).unwrap();
+        let names: Vec<String> = trace.choices().into_iter().map(|(a, _, _)| a.to_string()).collect();
+        assert_eq!(names, ["@c", "@x/f/a"]);
+    }
     all_balanced(&SHARED, 20_000, kernels::balance::SHARED);
+}
+
+#[test]
+fn a_support_that_moves_with_a_branch() {
+    all_balanced(&MOVING, 20_000, kernels::balance::MOVING);
 }
 
 #[test]
@@ -287,9 +328,19 @@ fn gaussian_choices() {
 /// Neighbours that have nothing to do with the data, and few of them: the density of the proposal is in the ratio.
 #[test]
 fn proposals_from_wrong_neighbours() {
-    for case in
-        [&DISCRETE, &STRUCTURE, &SHARED, &FINITE_SUPPORT, &SUPPORT, &GAUSSIAN, &ELEMENTS, &SHARED_GROUPS, &COUNTS]
-    {
+    for case in [
+        &DISCRETE,
+        &STRUCTURE,
+        &SAME_NAME,
+        &SHARED,
+        &MOVING,
+        &FINITE_SUPPORT,
+        &SUPPORT,
+        &GAUSSIAN,
+        &ELEMENTS,
+        &SHARED_GROUPS,
+        &COUNTS,
+    ] {
         all_balanced(case, 20_000, kernels::balance::NEIGHBOURS);
     }
     all_balanced(&STRUCTURE, 20_000, kernels::balance::NEIGHBOURS_OF_SOME);

@@ -264,6 +264,54 @@ fn covariances() {
     }
 }
 
+/// Distributions that are values, drawn from and observed, by what their covariance is made of.
+#[test]
+fn covariances_of_distributions_as_values() {
+    let of = "assume l ~ gamma(9, 9); assume s ~ gamma(9, 9); assume m ~ normal(0, 1); assume r ~ uniform(-0.8, 0.8);";
+    let gp = "gp(mean = m, cov = sq_exp(l, s) + white(0.3), at = [0, 0.4, 1.1])";
+    let chol = "mv_normal([m, 1, 0], chol = [[s, 0, 0], [r, l, 0], [m, 0.2, 1]])";
+    let cov = "mv_normal([m, 1, 0], cov = [[2, r, 0], [r, 1 + s, m / 9], [0, m / 9, 1 + l]])";
+    for d in [gp, chol, cov, "gp(0, sq_exp(l), [0, 1, 2])"] {
+        for p in [
+            format!("let d = {d}; observe d = [0.3, 0.4, 1];"),
+            format!("let d = {d}; assume x ~ d; observe normal(x, 0.5) = [1, 2, 0];"),
+            format!(
+                "assume c ~ flip(0.5); let d = if c {{ {d} }} else {{ iid(normal(m, s), 3) }}; observe d = [1, 2, 0];"
+            ),
+            format!(
+                "fn make(a) {{ a }} let d = make({d}); assume x ~ d; observe d = [1, 2, 0]; observe normal(x, 1) = [1, 1, 0];"
+            ),
+        ] {
+            check(&format!("{of} {p}"));
+        }
+    }
+    for d in [chol, cov] {
+        let whitened = d.replace("mv_normal(", "mv_normal(whitened = true, mean = ");
+        check(&format!("{of} let d = {whitened}; assume x ~ d; observe normal(x, 0.5) = [1, 2, 0];"));
+    }
+    check(&format!(
+        "{of} assume x ~ {}; observe normal(x, 0.5) = [1, 2, 0];",
+        gp.replace("gp(", "gp(centred = true, ")
+    ));
+    check(&format!("{of} let ds = [{gp}, {chol}]; observe ds[1] = [1, 2, 0]; observe ds[0] = [0.1, 0.2, 1.1];"));
+}
+
+#[test]
+fn wishart_by_its_scale() {
+    let of = "assume a ~ gamma(9, 9); assume b ~ normal(0, 1);";
+    let scale = "[[a, 0, 0], [b, 1 + a, 0], [0.3 * b, a * b, 0.7]]";
+    for p in [
+        format!("assume w ~ wishart(4.5, {scale}); observe normal(w[1][0] + w[2][2], 1) = 0.5;"),
+        format!(
+            "let d = wishart(3 + a, {scale}); assume w ~ d; observe mv_normal([0, b, 1], chol = w) = [0.3, 0.1, 1];"
+        ),
+        format!("observe wishart(4 + a, {scale}) = [[1, 0, 0], [0.4, 1.2, 0], [-0.3, 0.1, 0.5]];"),
+        "observe wishart(2 + a, [[a]]) = [[0.8]];".to_owned(),
+    ] {
+        check(&format!("{of} {p}"));
+    }
+}
+
 #[test]
 fn structure_passes_derivatives_through() {
     for p in [
@@ -318,7 +366,7 @@ fn bodies_with_detected_joints() {
 
 #[test]
 fn what_has_no_derivative_says_so() {
-    let text = "assume l ~ gamma(3, 2); let d = gp(mean = 0, cov = sq_exp(l), at = [0, 1]); observe d = [0.3, 0.4];";
+    let text = "assume l ~ gamma(3, 2); let d = iid(gp(mean = 0, cov = sq_exp(l), at = [0, 1]), 2); observe d = [[0.3, 0.4], [0, 1]];";
     let model = Program::parse(text).unwrap().compile().unwrap();
     let mut trace = model.simulate(1, 0).unwrap();
     let selection = trace.select(&Selector::All);

@@ -1,4 +1,5 @@
-//! The same chain, bit for bit, by increments and by running everything again: every shipped program, and random ones.
+//! The same chain, bit for bit, by increments and by running everything again: every shipped program, and random ones. Programs
+//! that look at a picture do so at a few pixels and for a few steps, since running everything again draws everything anew.
 
 #[path = "common/tape.rs"]
 mod tape;
@@ -23,27 +24,73 @@ fn same(what: &str, program: impl Fn() -> Program, steps: u64, warmup: u64) {
 
 #[test]
 fn shipped_programs() {
-    let root = env!("CARGO_MANIFEST_DIR");
-    let photo = format!("{root}/examples/images/coffee_cup.png");
-    for (name, observed, steps, warmup) in [
-        ("coin.pcad", false, 500, 200),
-        ("linreg.pcad", false, 300, 200),
-        ("mixture.pcad", false, 600, 300),
-        ("crp.pcad", false, 400, 200),
-        ("geometric.pcad", false, 500, 200),
-        ("lathe.pcad", true, 12, 12),
-        ("lathe_paper.pcad", true, 12, 12),
+    for (name, steps, warmup) in [
+        ("coin.pcad", 500, 200),
+        ("linreg.pcad", 300, 200),
+        ("mixture.pcad", 600, 300),
+        ("crp.pcad", 400, 200),
+        ("geometric.pcad", 500, 200),
     ] {
-        let open = || {
-            let program = Program::open(name).unwrap_or_else(|e| panic!("{e}"));
-            let first = program.interface().data.iter().find(|d| !d.has_default).map(|d| d.name.to_string());
-            match first.filter(|_| observed) {
-                Some(data) => program.observe_file(&data, &photo).unwrap_or_else(|e| panic!("{e}")),
-                None => program,
-            }
-        };
-        same(name, open, steps, warmup);
+        same(name, || Program::open(name).unwrap_or_else(|e| panic!("{e}")), steps, warmup);
     }
+}
+
+/// A shipped program that looks at a picture, at `size` pixels if it says at how many, and at what else is given.
+fn same_of_picture(name: &str, size: Option<u32>, given: &[(&str, &str)], steps: u64, warmup: u64) {
+    let open = || {
+        let program = Program::open(name).unwrap_or_else(|e| panic!("{e}"));
+        let program = size.into_iter().fold(program, |p, s| p.set("size", &s.to_string()));
+        given.iter().fold(program, |p, (data, file)| {
+            let path = format!("{}/examples/images/{file}", env!("CARGO_MANIFEST_DIR"));
+            p.observe_file(data, &path).unwrap_or_else(|e| panic!("{e}"))
+        })
+    };
+    same(name, open, steps, warmup);
+}
+
+const CUP: (&str, &str) = ("photo", "coffee_cup.png");
+const SKIER: (&str, &str) = ("photo", "skier.jpg");
+
+#[test]
+fn shipped_lathes() {
+    same_of_picture("lathe.pcad", None, &[CUP], 12, 12);
+    same_of_picture("lathe_paper.pcad", None, &[CUP], 12, 12);
+}
+
+#[test]
+fn shipped_scene() {
+    same_of_picture("scene.pcad", Some(48), &[CUP], 60, 60);
+}
+
+#[test]
+fn shipped_human() {
+    same_of_picture("human.pcad", Some(48), &[SKIER], 60, 60);
+}
+
+/// With keypoints: joints, and kernels that follow their slopes.
+#[test]
+fn shipped_human_with_keypoints() {
+    same_of_picture("human.pcad", Some(48), &[SKIER, ("points", "skier.keypoints.json")], 60, 60);
+}
+
+#[test]
+fn shipped_human_of_the_paper() {
+    same_of_picture("human_paper.pcad", Some(48), &[SKIER], 40, 40);
+}
+
+#[test]
+fn shipped_human_with_handles() {
+    same_of_picture("human_kth.pcad", Some(48), &[SKIER], 60, 0);
+}
+
+#[test]
+fn shipped_two_people() {
+    same_of_picture("two_people.pcad", Some(48), &[SKIER], 40, 40);
+}
+
+#[test]
+fn shipped_animal() {
+    same_of_picture("autorig.pcad", Some(48), &[SKIER], 20, 20);
 }
 
 /// A program of a few choices that read each other through arithmetic, branches, loops and arrays.

@@ -67,9 +67,8 @@ fn the_table_says_what_the_tests_run() {
 
 #[test]
 fn every_kernel_that_runs_is_proved_in_two_ways_at_least() {
-    // `optimize` is not a sampler, `abc` draws from no posterior the others know, and `smc` has its loop to itself, which the
-    // tests by turns do not give it: exact answers are what they have, or tests of their own.
-    let special = ["optimize", "abc", "smc"];
+    // `optimize` is not a sampler: it has tests of its own.
+    let special = ["optimize"];
     for (kernel, _) in kernels().into_iter().filter(|(k, runs)| *runs && !special.contains(&k.as_str())) {
         let by: Vec<&str> = PROOFS.iter().filter(|p| p.runs(&kernel)).map(|p| p.name).collect();
         assert!(by.len() >= 2, "{kernel} is in {by:?} only: add it to lists of tests/common/kernels.rs");

@@ -326,14 +326,15 @@ fn restored_states_are_the_saved_ones() {
     }
 }
 
-/// Two branches draw at one address: whichever is there is found by it, after moves that were kept and moves that were not.
+/// Two functions called at one place draw at one address, `@x/f/z[0]`: whichever is there is found by it, after moves that were kept and moves that were not.
 #[test]
 fn choices_are_found_by_their_addresses_as_branches_change() {
     use pcadlang::infer::{At, Kernel, Mh, Pick, Scope};
     let model = Model::from_text(
         "assume c ~ flip(0.4);
-         assume x = if c { z[0] ~ normal(1, 1); z[0] } else { z[0] ~ normal(-1, 1); z[1] ~ normal(0, 1); z[0] + z[1] };
-         observe normal(x, 1) = 0.5;",
+         let f = if c { fn() { z[0] ~ normal(1, 1); z[0] } }
+                 else { fn() { z[0] ~ normal(-1, 1); z[1] ~ normal(0, 1); z[0] + z[1] } };
+         assume x = f(); observe normal(x, 1) = 0.5;",
     )
     .unwrap_or_else(|e| panic!("{e}"));
     let mut trace = model.simulate(1, 0).unwrap_or_else(|e| panic!("{e}"));

@@ -17,7 +17,6 @@
 //! | … | the header, JSON |
 
 use super::{BankError, Features};
-use crate::report::bytes_hash;
 use serde::{Deserialize, Serialize};
 
 /// What a bank begins with.
@@ -95,11 +94,6 @@ impl Preamble {
     }
 }
 
-/// The 64-bit FNV-1a hash of bytes.
-pub(super) fn fnv(bytes: &[u8]) -> u64 {
-    u64::from_str_radix(&bytes_hash(bytes), 16).unwrap_or_default()
-}
-
 #[cfg(test)]
 mod tests {
     use super::*;
@@ -116,6 +110,5 @@ mod tests {
         let mut other = p.encode();
         other[8] = 7;
         assert!(matches!(Preamble::decode(&other, 1000), Err(BankError::Version { found: 7, expected: VERSION })));
-        assert_eq!(fnv(b"foobar"), 0x8594_4171_f739_67e8);
     }
 }

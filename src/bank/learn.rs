@@ -3,11 +3,11 @@
 use super::write::BankWriter;
 use super::{BankError, Entry, Features, Named, as_view, picture};
 use crate::Model;
+use crate::infer::{attempts, in_parallel};
 use crate::lang::code::Operand;
 use crate::lang::value::Value;
 use crate::rng::{Purpose, StreamKey};
 use crate::trace::{Draws, Limits, Trace};
-use rayon::prelude::*;
 use std::path::Path;
 use std::sync::Arc;
 use std::sync::atomic::{AtomicU64, Ordering};
@@ -45,7 +45,6 @@ pub fn learn(model: &Model, how: &Learn, path: &Path, done: &AtomicU64) -> Resul
     let mut features = how.features.clone();
     let first = one(&prior, operand, how, 0, |view| features = features.clone().named(view))?;
     let mut writer = BankWriter::create(path, how.count, first.features.len())?;
-    let pool = rayon::ThreadPoolBuilder::new().num_threads(how.threads).build();
     let mut from = 0;
     while from < how.count {
         let to = (from + BLOCK).min(how.count);
@@ -54,10 +53,8 @@ pub fn learn(model: &Model, how: &Learn, path: &Path, done: &AtomicU64) -> Resul
             done.fetch_add(1, Ordering::Relaxed);
             entry
         };
-        let entries: Result<Vec<Entry>, BankError> = match &pool {
-            Ok(pool) => pool.install(|| (from..to).into_par_iter().map(draw).collect()),
-            Err(_) => (from..to).map(draw).collect(),
-        };
+        let entries: Result<Vec<Entry>, BankError> =
+            in_parallel(how.threads, (from..to).collect(), draw).into_iter().collect();
         writer.add(&entries?)?;
         from = to;
     }
@@ -76,22 +73,14 @@ fn one(
     i: u64,
     seen: impl FnOnce(&crate::render::View),
 ) -> Result<Entry, BankError> {
-    let mut last = None;
-    for attempt in 0..RETRIES {
-        let mut trace = prior.clone();
-        match trace.imagine(&[operand], draws(how.seed, i, attempt), drawn) {
-            Ok((latents, value)) => {
-                let view = value.as_ref().and_then(|v| as_view(v, None)).ok_or_else(|| {
-                    BankError::Observed(format!("entry {i}: the picture is neither a view nor a solid in this scene"))
-                })?;
-                seen(&view);
-                return Ok(Entry { latents, features: how.features.of(&view)? });
-            }
-            Err(e) if e.is_recoverable() => last = Some(e),
-            Err(e) => return Err(BankError::Run(e)),
-        }
-    }
-    Err(last.map_or_else(|| BankError::Observed("no scene was drawn".into()), BankError::Run))
+    let (latents, value) =
+        attempts(RETRIES, |attempt| prior.clone().imagine(&[operand], draws(how.seed, i, attempt), drawn))
+            .map_err(BankError::Run)?;
+    let view = value.as_ref().and_then(|v| as_view(v, None)).ok_or_else(|| {
+        BankError::Observed(format!("entry {i}: the picture is neither a view nor a solid in this scene"))
+    })?;
+    seen(&view);
+    Ok(Entry { latents, features: how.features.of(&view)? })
 }
 
 /// The choices of a trace by address hash, and the value it was asked for.

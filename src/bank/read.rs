@@ -1,9 +1,10 @@
 //! Reading a bank: features block by block, latents of chosen entries only, so that it need not fit into memory.
 
-use super::format::{Header, Preamble, START, fnv};
+use super::format::{Header, Preamble, START};
 use super::record::{decode, latents};
 use super::{BankError, Named};
 use crate::infer::Neighbours;
+use crate::num::fnv1a;
 use crate::vision::features::Query;
 use std::fs::File;
 use std::io::{Read, Seek, SeekFrom};
@@ -41,7 +42,7 @@ impl Bank {
             return Err(BankError::Damaged("its header or its rows are too long".into()));
         }
         let text = bytes(&mut file, preamble.header, length - preamble.header)?;
-        if fnv(&text) != preamble.hash {
+        if fnv1a(&text) != preamble.hash {
             return Err(BankError::Damaged("its header was changed, or ends too early".into()));
         }
         let header: Header = serde_json::from_slice(&text).map_err(|e| BankError::Damaged(e.to_string()))?;

@@ -1,8 +1,9 @@
 //! Writing a bank, entry by entry: memory holds one place a entry, and the addresses.
 
-use super::format::{Header, Preamble, START, fnv};
+use super::format::{Header, Preamble, START};
 use super::record::{Entry, encode};
 use super::{BankError, Features};
+use crate::num::fnv1a;
 use rustc_hash::FxHashMap;
 use std::fs::File;
 use std::io::{Seek, SeekFrom, Write};
@@ -98,7 +99,8 @@ impl BankWriter {
         let at = self.end + table.len() as u64;
         self.put(self.end, &table)?;
         self.put(at, &text)?;
-        let preamble = Preamble { count: self.count, width: self.width, table: self.end, header: at, hash: fnv(&text) };
+        let preamble =
+            Preamble { count: self.count, width: self.width, table: self.end, header: at, hash: fnv1a(&text) };
         self.put(0, &preamble.encode())?;
         std::fs::rename(&self.partial, &self.path)?;
         self.done = true;

@@ -43,16 +43,15 @@ impl Gp {
         Gp(self.0.centred())
     }
 
-    /// The derivatives by the parameters of its covariance function, made at these points: of the log density of a stored value;
-    /// of one stored as noise, of what has these derivatives by the value.
-    pub fn covariance_gradient(
-        &self,
-        cov: &Covariance,
-        at: &[f64],
-        stored: &super::Datum,
-        by_value: &[f64],
-    ) -> Option<Vec<f64>> {
-        let by = self.0.factor.pull_cholesky(&self.0.factor_gradient(stored, by_value)?);
+    /// The derivatives by its Cholesky factor, the lower triangle by rows: of the log density of a stored value; of one stored as
+    /// noise, of what has these derivatives by the value.
+    pub fn factor_gradient(&self, stored: &super::Datum, by_value: &[f64]) -> Option<Vec<f64>> {
+        self.0.factor_gradient(stored, by_value)
+    }
+
+    /// From those by the factor to those by the parameters of its covariance function, made at these points.
+    pub fn pull_covariance(&self, cov: &Covariance, at: &[f64], by_factor: &[f64]) -> Option<Vec<f64>> {
+        let by = self.0.factor.pull_cholesky(by_factor);
         let mut out = vec![0.0; cov.param_count()];
         let mut entries = by.into_iter();
         for (i, x) in at.iter().enumerate() {

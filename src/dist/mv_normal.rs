@@ -63,21 +63,16 @@ impl MvNormal {
         MvNormal(self.0.centred())
     }
 
-    /// The derivatives by the entries of the covariance (both triangles) or, with `chol`, of its factor, as rows: of the log density
-    /// of a stored value; of one stored as noise, of what has these derivatives by the value.
-    pub fn matrix_gradient(&self, chol: bool, stored: &super::Datum, by_value: &[f64]) -> Option<Vec<Vec<f64>>> {
-        let mut by = self.0.factor_gradient(stored, by_value)?;
-        if !chol {
-            by = self.0.factor.pull_cholesky(&by);
-        }
-        // An entry off the diagonal of a covariance stands for two places.
-        let cell = |i: usize, j: usize| match (i.max(j), i.min(j)) {
-            (row, column) if i == j => by[row * (row + 1) / 2 + column],
-            _ if chol && j > i => 0.0,
-            (row, column) => by[row * (row + 1) / 2 + column] * if chol { 1.0 } else { 0.5 },
-        };
-        let n = self.0.size();
-        Some((0..n).map(|i| (0..n).map(|j| cell(i, j)).collect()).collect())
+    /// The derivatives by its Cholesky factor, the lower triangle by rows: of the log density of a stored value; of one stored as
+    /// noise, of what has these derivatives by the value.
+    pub fn factor_gradient(&self, stored: &super::Datum, by_value: &[f64]) -> Option<Vec<f64>> {
+        self.0.factor_gradient(stored, by_value)
+    }
+
+    /// From those by the factor to those by the entries of the covariance, its lower triangle by rows: what lies off the diagonal
+    /// stands for both of its places.
+    pub fn pull_covariance(&self, by_factor: &[f64]) -> Vec<f64> {
+        self.0.factor.pull_cholesky(by_factor)
     }
 
     /// The derivatives by the white noise behind a value, from those by the value.

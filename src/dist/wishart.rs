@@ -15,7 +15,7 @@ use nalgebra::DMatrix;
 ///
 /// L = S A, where A is lower triangular with standard normal numbers below the diagonal, and A\[i\]\[i\]^2 chi-squared with df - i
 /// degrees of freedom. The density is by the lower triangle of L. Gradients are by the value (n x n numbers, 0 above the
-/// diagonal) and by df.
+/// diagonal) and by df; those by S come apart ([`Wishart::scale_gradient`]).
 #[derive(Clone, Debug, PartialEq)]
 pub struct Wishart {
     df: f64,
@@ -44,6 +44,31 @@ impl Wishart {
         let jacobian = |i: usize| (i + 1) as f64 * libm::log(scale_chol[(i, i)]) + LN_SQRT_2PI * i as f64;
         let log_norm = -(0..n).map(jacobian).sum::<f64>();
         Ok(Wishart { df, scale, log_norm })
+    }
+
+    /// The derivatives of the log density of a value by the scale's factor S, its lower triangle by rows. With A = S^-1 L and G the
+    /// derivatives by A, they are -S^-T G A' less those of the log Jacobian.
+    pub fn scale_gradient(&self, x: &Datum) -> Option<Vec<f64>> {
+        if !self.log_density(x).is_finite() {
+            return None;
+        }
+        let n = self.scale.size();
+        let a = self.whiten(&triangle::entries(x, n)?);
+        let columns: Vec<Vec<f64>> = (0..n).map(|j| self.scale.solve_transposed(self.by_whitened(&a, j))).collect();
+        let cell = |i: usize, k: usize| {
+            let sum: f64 = columns.iter().enumerate().map(|(j, c)| c[i] * a[k * n + j]).sum();
+            -sum - if i == k { (i + 1) as f64 / self.scale.diagonal(i) } else { 0.0 }
+        };
+        let by: Vec<f64> = (0..n).flat_map(|i| (0..=i).map(move |k| (i, k))).map(|(i, k)| cell(i, k)).collect();
+        by.iter().all(|g| g.is_finite()).then_some(by)
+    }
+
+    /// The derivatives of the log density by column `j` of A = S^-1 L.
+    fn by_whitened(&self, a: &[f64], j: usize) -> Vec<f64> {
+        let n = self.scale.size();
+        let mut column: Vec<f64> = (0..n).map(|i| -a[i * n + j]).collect();
+        column[j] += (self.df - j as f64 - 1.0) / a[j * n + j];
+        column
     }
 
     /// S^-1 L.
@@ -120,9 +145,7 @@ impl Distribution for Wishart {
         let mut by_df = 0.0;
         for j in 0..n {
             let d = a[j * n + j];
-            let mut column: Vec<f64> = (0..n).map(|i| -a[i * n + j]).collect();
-            column[j] += (self.df - j as f64 - 1.0) / d;
-            for (i, g) in self.scale.solve_transposed(column).into_iter().enumerate().skip(j) {
+            for (i, g) in self.scale.solve_transposed(self.by_whitened(&a, j)).into_iter().enumerate().skip(j) {
                 by_x[i * n + j] = g;
             }
             by_df += libm::log(d) - 0.5 * LN_2 - 0.5 * digamma(0.5 * (self.df - j as f64));

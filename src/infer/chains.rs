@@ -1,10 +1,10 @@
 //! Chains side by side: each has its own streams, so the number of threads changes nothing but the time.
 
 use super::draws::Sink;
+use super::parallel::in_parallel;
 use super::plan::{ChainError, ChainResult, Progress, RunOptions, run_chain};
 use crate::lang::code::Code;
 use crate::syntax::ast::KStmt;
-use rayon::prelude::*;
 use std::sync::Arc;
 
 /// Runs chains `0 .. chains` of a plan; `sinks` has one sink a chain. All chains run to their end even if one fails. A limit
@@ -22,8 +22,5 @@ pub fn run_chains(
     let run =
         |(chain, mut sink): (usize, Box<dyn Sink>)| run_chain(code, plan, options, progress, &mut *sink, chain as u32);
     let work: Vec<_> = sinks.into_iter().enumerate().collect();
-    match rayon::ThreadPoolBuilder::new().num_threads(threads).build() {
-        Ok(pool) => pool.install(|| work.into_par_iter().with_max_len(1).map(run).collect()),
-        Err(_) => work.into_iter().map(run).collect(),
-    }
+    in_parallel(threads, work, run)
 }

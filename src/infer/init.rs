@@ -10,7 +10,7 @@ use crate::lang::value::Value;
 use crate::rng::{Purpose, StreamKey};
 use crate::syntax::ast::{Expr, KStmt, KStmtKind};
 use crate::syntax::span::Span;
-use crate::trace::{Draws, Limits, Trace};
+use crate::trace::{Draws, Limits, Trace, TraceResult};
 use std::fmt;
 use std::sync::Arc;
 use std::time::Instant;
@@ -61,6 +61,20 @@ pub struct ZeroTerm {
 impl fmt::Display for NoStart {
     fn fmt(&self, f: &mut fmt::Formatter<'_>) -> fmt::Result {
         write!(f, "every one of {RETRIES} draws from the prior has probability zero")
+    }
+}
+
+/// The first of so many attempts at drawing from a prior that leads where the program has a value.
+///
+/// # Errors
+/// The last attempt's, or the first that is not a matter of the values drawn.
+pub(crate) fn attempts<T>(most: u64, mut draw: impl FnMut(u64) -> TraceResult<T>) -> TraceResult<T> {
+    let mut attempt = 0;
+    loop {
+        match draw(attempt) {
+            Err(e) if e.is_recoverable() && attempt + 1 < most => attempt += 1,
+            done => return done,
+        }
     }
 }
 

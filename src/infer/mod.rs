@@ -12,6 +12,7 @@ mod init;
 mod kernel;
 mod kernels;
 mod neighbours;
+mod parallel;
 mod plan;
 mod population;
 pub mod predictive;
@@ -22,8 +23,10 @@ mod sites;
 
 pub use chains::run_chains;
 pub use default_plan::default_plan;
+pub(crate) use init::attempts;
 pub use init::{Start, StartError, starts};
 pub use kernel::{At, Kernel, Outcome, Pick, Scope};
 pub use kernels::{Abc, Block, Drift, Elliptical, Gibbs, Hmc, Knn, Mh, Nuts, Optimize, Slice, Smc, Temper};
 pub use neighbours::{Banks, Latent, Latents, Neighbours};
+pub(crate) use parallel::in_parallel;
 pub use plan::{ChainError, ChainResult, Progress, RunOptions, Watch};

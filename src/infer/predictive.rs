@@ -5,13 +5,13 @@
 //! statistics: Gelman, Meng & Stern, "Posterior predictive assessment of model fitness" (1996). Not here: judging.
 
 use super::calibration::simulate::{replicating, state};
+use super::parallel::in_parallel;
 use super::plan::{ChainError, Watch};
 use crate::lang::code::Code;
 use crate::lang::error::RunError;
 use crate::lang::value::Value;
 use crate::trace::{Address, Draws, Limits, Trace};
 use indexmap::IndexMap;
-use rayon::prelude::*;
 use std::sync::{Arc, Mutex, PoisonError};
 
 /// The test statistics.
@@ -128,12 +128,7 @@ pub fn prior(
         let trace = state(code, limits, seed, i)?;
         Ok(replication(&trace, replicating(seed, i, 0))?)
     };
-    let all: Vec<Result<Replication, ChainError>> =
-        match rayon::ThreadPoolBuilder::new().num_threads(threads.max(1)).build() {
-            Ok(pool) => pool.install(|| (0..count).into_par_iter().map(one).collect()),
-            Err(_) => (0..count).map(one).collect(),
-        };
-    all.into_iter().collect()
+    in_parallel(threads.max(1), (0..count).collect(), one).into_iter().collect()
 }
 
 /// Replications of every recorded draw of some chains, as a run's watch. Clones share them.

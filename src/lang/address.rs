@@ -1,8 +1,12 @@
-//! Addresses: the path that leads to a random choice or observation.
+//! Addresses: the path that leads to a random choice or observation, as a value and as text.
+//!
+//! What an address prints as reads back as the same address, but for keys that are arrays of one element or of arrays, which
+//! print as their elements. Not here: patterns with wildcards, and the address literals of programs.
 
 use super::code::segment_hash;
 use super::key::{Key, mix};
 use std::fmt;
+use std::str::FromStr;
 use std::sync::Arc;
 
 /// The address of a choice, an observation or a factor: `@pose[upperarm_l]/bone/rot[z]`.
@@ -86,4 +90,157 @@ impl fmt::Display for AddressSegment {
 /// Names given to observations and factors without one of their own; they always show their number.
 pub(crate) fn is_numbered(name: &str) -> bool {
     name == "obs" || name == "factor"
+}
+
+/// A text that is not an address.
+#[derive(Clone, Debug, PartialEq, Eq, thiserror::Error)]
+#[error("`{text}` is not an address: {expected} was expected at byte {at}; one looks like @pose[arm_l]/bone#2/rot[0]")]
+pub struct AddressTextError {
+    /// The text.
+    pub text: String,
+    /// Where reading stopped, in bytes.
+    pub at: usize,
+    /// What was expected there.
+    pub expected: &'static str,
+}
+
+impl FromStr for Address {
+    type Err = AddressTextError;
+
+    /// Reads an address as it is printed; the `@` may be left out.
+    fn from_str(text: &str) -> Result<Self, AddressTextError> {
+        let mut rest = text.strip_prefix('@').unwrap_or(text);
+        let wrong =
+            |rest: &str, expected| AddressTextError { text: text.to_owned(), at: text.len() - rest.len(), expected };
+        let mut segments = Vec::new();
+        loop {
+            let name = take(&mut rest, |c| c.is_alphanumeric() || c == '_');
+            if name.is_empty() {
+                return Err(wrong(rest, "a name"));
+            }
+            let mut segment = AddressSegment { name: Arc::from(name), occurrence: 1, keys: Vec::new() };
+            if let Some(after) = rest.strip_prefix('#') {
+                rest = after;
+                let digits = take(&mut rest, |c| c.is_ascii_digit());
+                segment.occurrence = digits.parse().ok().filter(|n| *n > 0).ok_or(wrong(after, "a number from 1"))?;
+            }
+            while let Some(after) = rest.strip_prefix('[') {
+                rest = after;
+                segment.keys.push(read_key(&mut rest).ok_or_else(|| wrong(rest, "a key and `]`"))?);
+            }
+            segments.push(segment);
+            match rest.strip_prefix('/') {
+                Some(after) => rest = after,
+                None if rest.is_empty() => return Ok(Address { segments }),
+                None => return Err(wrong(rest, "`/`, `#`, `[` or the end")),
+            }
+        }
+    }
+}
+
+/// Takes the leading characters of a kind.
+fn take<'t>(rest: &mut &'t str, of_kind: impl Fn(char) -> bool) -> &'t str {
+    let (taken, left) = rest.split_at(rest.find(|c| !of_kind(c)).unwrap_or(rest.len()));
+    *rest = left;
+    taken
+}
+
+/// Takes a key up to its bracket: one, or several between commas.
+fn read_key(rest: &mut &str) -> Option<Key> {
+    let mut keys = Vec::new();
+    loop {
+        keys.push(match rest.strip_prefix('"') {
+            Some(after) => {
+                *rest = after;
+                Key::Str(quoted(rest)?.into())
+            }
+            None => {
+                let word = take(rest, |c| !matches!(c, ',' | ']'));
+                match (word, word.parse::<f64>()) {
+                    ("true", _) => Key::Bool(true),
+                    ("false", _) => Key::Bool(false),
+                    (_, Ok(x)) => Key::num(x)?,
+                    _ if super::key::is_bare(word) => Key::Str(word.into()),
+                    _ => return None,
+                }
+            }
+        });
+        if let Some(after) = rest.strip_prefix(',') {
+            *rest = after;
+            continue;
+        }
+        *rest = rest.strip_prefix(']')?;
+        return if keys.len() == 1 { keys.pop() } else { Some(Key::List(keys.into())) };
+    }
+}
+
+/// Takes the rest of a string that is printed with escapes, and its closing quote.
+fn quoted(rest: &mut &str) -> Option<String> {
+    let mut text = String::new();
+    let mut chars = rest.chars();
+    loop {
+        text.push(match chars.next()? {
+            '"' => break,
+            '\\' => match chars.next()? {
+                'n' => '\n',
+                'r' => '\r',
+                't' => '\t',
+                '0' => '\0',
+                'u' => {
+                    let (code, after) = chars.as_str().strip_prefix('{')?.split_once('}')?;
+                    chars = after.chars();
+                    char::from_u32(u32::from_str_radix(code, 16).ok()?)?
+                }
+                c => c,
+            },
+            c => c,
+        });
+    }
+    *rest = chars.as_str();
+    Some(text)
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    #[test]
+    fn what_is_printed_reads_back() {
+        let key = |s: &str| Key::Str(s.into());
+        let number = |x: f64| Key::Num(x.to_bits());
+        let keys = vec![
+            vec![],
+            vec![number(17.0), number(-2.5)],
+            vec![number(1e300), number(f64::INFINITY)],
+            vec![key("arm_l"), key("a]/b"), key("é \"\\\n\u{7}"), key("")],
+            vec![Key::Bool(true), key("true"), key("inf"), key("nan"), key("Infinity")],
+            vec![Key::List([number(1.0), key("x,y"), Key::Bool(false)].into())],
+        ];
+        let names = ["x", "obs", "factor", "été_2"];
+        let segment = |i: usize, keys: &Vec<Key>| AddressSegment {
+            name: names[i % 4].into(),
+            occurrence: 1 + (i % 3) as u32,
+            keys: keys.clone(),
+        };
+        let segments: Vec<_> = keys.iter().enumerate().map(|(i, k)| segment(i, k)).collect();
+        for n in 1..=segments.len() {
+            for start in 0..=segments.len() - n {
+                let address = Address { segments: segments[start..start + n].to_vec() };
+                let text = address.to_string();
+                assert_eq!(text.parse().as_ref(), Ok(&address), "{text}");
+                assert_eq!(text[1..].parse().as_ref(), Ok(&address), "{text} without its @");
+            }
+        }
+    }
+
+    #[test]
+    fn what_is_no_address_is_told() {
+        for text in
+            ["", "@", "@a/", "@a[", "@a[1", "@a[]", "@a[a b]", "@a#0", "@a#x", "@a b", "@a[\"b]", "@a[nan]", "@**"]
+        {
+            let e = text.parse::<Address>().unwrap_err();
+            assert!(e.at <= text.len() && e.to_string().contains("is not an address"), "{text}: {e}");
+        }
+        assert_eq!("@a/b c".parse::<Address>().unwrap_err().at, 4);
+    }
 }

@@ -7,6 +7,7 @@ use crate::lang::error::Fault;
 use crate::lang::value::Value;
 use crate::num::{ExactSum, accumulate};
 use smallvec::SmallVec;
+use std::cmp::Ordering;
 use std::sync::Arc;
 
 /// The score of an observation.
@@ -119,7 +120,7 @@ fn shaped(value: &Value, rest: &mut &[f64]) -> Adjoint {
 /// From the derivatives by a distribution's parameters to those by the arguments it was made from.
 pub(crate) fn by_arguments(a: &Args, dist: &Dist, params: &[f64]) -> SmallVec<[Adjoint; 4]> {
     let count = a.values.len();
-    let covariance = matrix(a, dist).map(|(i, _)| i);
+    let covariance = matrix(dist, a.values);
     // A product made of arrays: the parameters of each element in turn.
     if let Dist::Product(p) = dist
         && !p.is_empty()
@@ -162,39 +163,49 @@ pub(crate) fn by_arguments(a: &Args, dist: &Dist, params: &[f64]) -> SmallVec<[A
     (0..count).map(one).collect()
 }
 
-/// What an argument says of a covariance.
-#[derive(Clone, Copy, PartialEq, Eq)]
-pub(crate) enum Matrix {
-    Kernel,
-    Covariance,
-    Factor,
-}
-
-/// The argument with a covariance, whose derivatives come by another way: [`by_matrix`].
-pub(crate) fn matrix(a: &Args, dist: &Dist) -> Option<(usize, Matrix)> {
-    match (dist, a.get(1)) {
-        (Dist::Gp(_), _) => Some((1, Matrix::Kernel)),
-        (Dist::MvNormal(_), Value::Unit) => Some((2, Matrix::Factor)),
-        (Dist::MvNormal(_), _) => Some((1, Matrix::Covariance)),
+/// The argument that is a covariance or a factor of one, whose derivatives come by another way: [`by_factor`] and [`by_matrix`].
+pub(crate) fn matrix(dist: &Dist, values: &[&Value]) -> Option<usize> {
+    match (dist, values.get(1)) {
+        (Dist::MvNormal(_), Some(Value::Unit)) => Some(2),
+        (Dist::Gp(_) | Dist::MvNormal(_) | Dist::Wishart(_), _) => Some(1),
         _ => None,
     }
 }
 
-/// The derivatives by the argument with a covariance, and which it is: of the log density of a stored value, or of a function with
-/// the derivatives `by_value` by the value that white noise makes. Nothing if there is no such argument; `None` where they are not known.
-pub(crate) fn by_matrix(a: &Args, dist: &Dist, stored: &Datum, by_value: &[f64]) -> Option<Option<(usize, Adjoint)>> {
-    let Some((i, which)) = matrix(a, dist) else { return Some(None) };
-    let by = match dist {
+/// The derivatives by the Cholesky factor of a distribution's covariance, its lower triangle by rows: of the log density of a
+/// stored value; of one stored as noise, of what has these derivatives by the value.
+pub(crate) fn by_factor(dist: &Dist, stored: &Datum, by_value: &[f64]) -> Option<Vec<f64>> {
+    match dist {
+        Dist::Gp(d) => d.factor_gradient(stored, by_value),
+        Dist::MvNormal(d) => d.factor_gradient(stored, by_value),
+        Dist::Wishart(d) => d.scale_gradient(stored),
+        _ => None,
+    }
+}
+
+/// From those to the derivatives by the argument the factor was made from, in its shape.
+pub(crate) fn by_matrix(a: &Args, dist: &Dist, by_factor: &[f64]) -> Option<Adjoint> {
+    // An entry off the diagonal of a covariance stands for two places, one of a factor for one.
+    let rows = |by: &[f64], above: f64| {
+        let n = (0..).find(|n| n * (n + 1) / 2 >= by.len()).unwrap_or(0);
+        let cell = |i: usize, j: usize| {
+            let (row, column) = (i.max(j), i.min(j));
+            let share = match i.cmp(&j) {
+                Ordering::Equal => 1.0,
+                Ordering::Less => above,
+                Ordering::Greater => 1.0 - above,
+            };
+            by.get(row * (row + 1) / 2 + column).map_or(0.0, |g| g * share)
+        };
+        Adjoint::List((0..n).map(|i| Adjoint::Array((0..n).map(|j| cell(i, j)).collect())).collect())
+    };
+    match dist {
         Dist::Gp(d) => {
             let cov = a.get(1).downcast::<CovarianceValue>()?;
-            let at = a.array(2).ok()?;
-            Adjoint::Array(d.covariance_gradient(&cov.0, &at, stored, by_value)?)
+            Some(Adjoint::Array(d.pull_covariance(&cov.0, &a.array(2).ok()?, by_factor)?))
         }
-        Dist::MvNormal(d) => {
-            let rows = d.matrix_gradient(which == Matrix::Factor, stored, by_value)?;
-            Adjoint::List(rows.into_iter().map(Adjoint::Array).collect())
-        }
-        _ => return None,
-    };
-    Some(Some((i, by)))
+        Dist::MvNormal(d) if !matches!(a.get(1), Value::Unit) => Some(rows(&d.pull_covariance(by_factor), 0.5)),
+        Dist::MvNormal(_) | Dist::Wishart(_) => Some(rows(by_factor, 0.0)),
+        _ => None,
+    }
 }

@@ -86,9 +86,11 @@ pub fn hash_str(h: u64, s: &str) -> u64 {
     h
 }
 
-/// Whether a string can stand in an address without quotes.
-fn is_bare(s: &str) -> bool {
+/// Whether a string can stand in an address without quotes, and not be taken for something else.
+pub(crate) fn is_bare(s: &str) -> bool {
     !s.is_empty()
+        && !matches!(s, "true" | "false")
+        && s.parse::<f64>().is_err()
         && s.chars().all(|c| c.is_ascii_alphanumeric() || c == '_')
         && !s.starts_with(|c: char| c.is_ascii_digit())
 }

@@ -151,20 +151,20 @@ impl Graph {
             return Selection(i as u32);
         }
         let all = self.choices.selections[0].listed.clone();
-        let (mut hashes, mut targets) = (Vec::new(), Vec::new());
-        for (hash, t) in all.0.iter().zip(all.1.iter()) {
-            let mut facts = self.facts(code, t.node, selector.needs_address(), None);
-            if t.element != NONE && selector.needs_address() {
-                push_key(&mut facts.address, t.element);
-            }
-            if selector.selects(&facts) {
-                hashes.push(*hash);
-                targets.push(*t);
-            }
-        }
+        let listed = all.0.iter().zip(all.1.iter()).filter(|(_, t)| self.selects(code, selector, t));
+        let (hashes, targets) = listed.map(|(hash, t)| (*hash, *t)).unzip();
         let members = Members::new(selector.clone(), hashes, targets);
         self.choices.selections.push(members);
         Selection(self.choices.selections.len() as u32 - 1)
+    }
+
+    /// Whether a selector selects a choice.
+    pub fn selects(&self, code: &Code, selector: &Selector, t: &Target) -> bool {
+        let mut facts = self.facts(code, t.node, selector.needs_address(), None);
+        if t.element != NONE && selector.needs_address() {
+            push_key(&mut facts.address, t.element);
+        }
+        selector.selects(&facts)
     }
 
     /// Choices by their place in the program: slot by slot and pass by pass, from the outside in.
@@ -190,12 +190,13 @@ impl Graph {
         keyed.into_iter().map(|(_, t)| t).collect()
     }
 
-    /// What selections ask about a choice.
-    fn facts(&self, code: &Code, n: NodeId, with_address: bool, dist: Option<&Dist>) -> Facts {
+    /// What selections ask about a choice, or `project` about an observation.
+    pub fn facts(&self, code: &Code, n: NodeId, with_address: bool, dist: Option<&Dist>) -> Facts {
         let made = if dist.is_none() { self.dist_of(code, n) } else { None };
         let dist = dist.or(made.as_ref());
         let support = dist.map(Dist::stored_support);
         Facts {
+            choice: matches!(self.op(code, n), Op::Draw { .. }),
             address: if with_address { self.address(code, n) } else { Address::default() },
             tags: self.tags(code, n),
             discrete: support.as_ref().is_some_and(Support::is_discrete),

@@ -14,6 +14,7 @@ mod journal;
 mod mark;
 mod node;
 mod observed;
+mod operations;
 mod path;
 mod peek;
 mod propose;
@@ -22,10 +23,11 @@ mod save;
 mod select;
 mod spread;
 
-pub use crate::lang::address::{Address, AddressSegment};
+pub use crate::lang::address::{Address, AddressSegment, AddressTextError};
 pub use choices::{Selection, Target};
 pub use graph::Limits;
 pub use observed::{Observation, Replicate};
+pub use operations::{Given, Update};
 pub use propose::{Change, Constraint, Draws, Weight};
 pub use save::{SaveError, SavedTrace};
 pub use select::{ChoiceKind, Pattern, PatternSegment, Selector};
@@ -131,12 +133,26 @@ impl Trace {
         constraints: &[(u64, Constraint)],
         draws: Draws,
     ) -> TraceResult<Weight> {
+        self.propose_observed(changes, constraints, &[], draws)
+    }
+
+    /// The same, with values in place of observed ones, by the hashes of the observations' addresses.
+    fn propose_observed(
+        &mut self,
+        changes: &[(Target, Change)],
+        constraints: &[(u64, Constraint)],
+        observed: &[(u64, Value)],
+        draws: Draws,
+    ) -> TraceResult<Weight> {
         self.rollback();
         let before = self.graph.begin();
         self.graph.draws = draws;
         self.graph.constraints.extend(constraints.iter().cloned());
+        self.put_observed(observed);
         let spread = match changes {
-            [(target, change)] => self.graph.spread_of(&self.code, *target).map(|s| (*target, change, s)),
+            [(target, change)] if observed.is_empty() => {
+                self.graph.spread_of(&self.code, *target).map(|s| (*target, change, s))
+            }
             _ => None,
         };
         let settled = match spread {

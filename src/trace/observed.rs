@@ -15,6 +15,7 @@ use crate::lang::code::{Code, DistSpec, Op, Operand};
 use crate::lang::error::Fault;
 use crate::lang::value::Value;
 use crate::rng::Stream;
+use rustc_hash::FxHashMap;
 use std::sync::Arc;
 
 /// An observation of a trace.
@@ -84,14 +85,25 @@ impl Trace {
     /// # Errors
     /// If a value cannot be scored; the trace is then as before.
     pub fn set_observed(&mut self, values: &[(u64, Value)]) -> TraceResult<Weight> {
-        self.rollback();
-        let mut nodes: rustc_hash::FxHashMap<u64, NodeId> = rustc_hash::FxHashMap::default();
-        for n in self.scored_nodes() {
-            if let Op::Observe { site, .. } = self.graph.op(&self.code, n) {
-                nodes.insert(self.graph.site_hash(&self.code, self.graph.nodes[n as usize].frame, *site), n);
-            }
+        self.propose_observed(&[], &[], values, Draws::default())
+    }
+
+    /// The observations by the hashes of their addresses.
+    pub(super) fn observation_nodes(&self) -> FxHashMap<u64, NodeId> {
+        let (g, code) = (&self.graph, &*self.code);
+        let hashed = |n: NodeId| match g.op(code, n) {
+            Op::Observe { site, .. } => Some((g.site_hash(code, g.nodes[n as usize].frame, *site), n)),
+            _ => None,
+        };
+        self.scored_nodes().filter_map(hashed).collect()
+    }
+
+    /// Puts values in place of observed ones, within an update.
+    pub(super) fn put_observed(&mut self, values: &[(u64, Value)]) {
+        if values.is_empty() {
+            return;
         }
-        let before = self.graph.begin();
+        let nodes = self.observation_nodes();
         for (hash, value) in values {
             self.graph.put_observed(*hash, value.clone());
             if let Some(n) = nodes.get(hash) {
@@ -100,8 +112,6 @@ impl Trace {
                 self.graph.mark_target(&self.code, *n);
             }
         }
-        let settled = self.graph.settle(&self.code);
-        self.pend(before, settled)
     }
 }
 

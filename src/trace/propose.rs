@@ -30,6 +30,8 @@ impl Draws {
 pub enum Change {
     /// It takes this value, in stored form (for a whitened gp: the white noise behind it).
     Set(Datum),
+    /// It takes this value, as the program sees it.
+    Value(Datum),
     /// It is drawn anew from its prior, as that is after the update.
     Resample,
     /// It becomes the image of this point of the unconstrained space under its support, as that is after the update; the

@@ -66,9 +66,11 @@ pub enum PatternSegment {
     },
 }
 
-/// What is known of a choice when it is registered.
+/// What is known of a choice when it is registered, or of an observation when it is asked for.
 #[derive(Clone, Debug)]
 pub(crate) struct Facts {
+    /// Kinds are of choices; an observation has none.
+    pub choice: bool,
     pub address: Address,
     pub tags: Vec<(Arc<str>, Option<Key>)>,
     pub discrete: bool,
@@ -131,7 +133,7 @@ impl Selector {
             Selector::Tag { name, value } => {
                 facts.tags.iter().any(|(n, v)| n == name && (value.is_none() || v == value))
             }
-            Selector::Kind(ChoiceKind::Continuous) => !facts.discrete,
+            Selector::Kind(ChoiceKind::Continuous) => facts.choice && !facts.discrete,
             Selector::Kind(ChoiceKind::Discrete) => facts.discrete,
             Selector::Kind(ChoiceKind::Gaussian) => facts.gaussian,
             Selector::Kind(ChoiceKind::Finite) => facts.finite,

@@ -121,13 +121,32 @@ pub mod balance {
         with_mh!("slice($continuous)"),
         with_mh!("block(@x/**)"),
     ];
-    pub const SHARED: &[&str] = &[
+    pub const SAME_NAME: &[&str] = &[
         "mh(one(@**))",
         "block(@**)",
         "drift(one(@**), 0.7)",
         "drift(@**, 0.7)",
         with_mh!("gibbs(@c)"),
         with_mh!("drift(@x/a, 0.8)"),
+    ];
+    pub const SHARED: &[&str] = &[
+        "mh(one(@**))",
+        "block(@**)",
+        "drift(one(@**), 0.7)",
+        "drift(@**, 0.7)",
+        with_mh!("gibbs(@c)"),
+        with_mh!("drift(@x/**, 0.8)"),
+        with_mh!("slice(@x/**)"),
+        with_mh!("hmc($continuous, steps = 3)"),
+    ];
+    pub const MOVING: &[&str] = &[
+        "mh(one(@**))",
+        "block(@**)",
+        "drift(one(@**), 0.7)",
+        "drift(@**, 0.7)",
+        with_mh!("gibbs(@c)"),
+        with_mh!("slice(@x)"),
+        with_mh!("hmc(@x, steps = 3)"),
     ];
     pub const ELEMENTS: &[&str] = &[
         "mh(one(@**))",
@@ -156,7 +175,8 @@ pub mod balance {
     /// The same choices always.
     pub const FIXED: &[&[&str]] = &[DISCRETE, SUPPORT, FINITE_SUPPORT, COUNTS, GAUSSIAN, NEIGHBOURS];
     /// Choices that appear, vanish, change form or are shared.
-    pub const CHANGING: &[&[&str]] = &[STRUCTURE, SHARED, ELEMENTS, SHARED_GROUPS, NEIGHBOURS, NEIGHBOURS_OF_SOME];
+    pub const CHANGING: &[&[&str]] =
+        &[STRUCTURE, SAME_NAME, SHARED, MOVING, ELEMENTS, SHARED_GROUPS, NEIGHBOURS, NEIGHBOURS_OF_SOME];
 }
 
 /// Parameters and data by turns, data as choices (`tests/balance.rs`); `%` is the selection.
@@ -175,7 +195,15 @@ pub const CALIBRATED: &[&str] = &[
     "mh(@c); nuts($continuous, max_depth = 5);",
     "temper(mh(one(@**)), levels = 3);",
     "gibbs(each($finite)); drift(each($continuous));",
+    "knn(@**, bank = \"b\"); mh(one(@**));",
+    "knn(one(@**), bank = \"b\", k = 2); block(@**);",
 ];
+
+/// Simulation-based calibration only: `smc` and `abc` go on with an estimate made under the data of the step before, which
+/// Geweke's test replaces.
+pub const RANKED: &[&str] = &["smc(drift(one(@**)), particles = 20)", "smc(mh(one(@**)), particles = 10)"];
+/// The same on counts, where simulated data are within `eps` only if they are equal: then `abc` is exact.
+pub const RANKED_ON_COUNTS: &[&str] = &["abc(mh(one(@**)), eps = 0.5)", "abc(block(@**), eps = 0.5)"];
 
 /// Chains that are the same bit for bit with and without incremental updates, on any number of threads (`tests/trace.rs`).
 pub const INCREMENTAL: &str = "mix { 0.3 => mh(one(@**)); 0.2 => gibbs(one($finite)); 0.2 => drift(one(@**)); 0.2 => elliptical(one($gaussian)); 0.1 => block(@**); 0.1 => slice(one($continuous)); }";
@@ -218,7 +246,7 @@ pub const PROOFS: &[Proof] = &[
         name: "SBC",
         shows: "true values have uniform ranks among draws given data simulated from them",
         file: "tests/calibration.rs",
-        statements: &[CALIBRATED],
+        statements: &[CALIBRATED, RANKED, RANKED_ON_COUNTS],
     },
     Proof {
         name: "Geweke",

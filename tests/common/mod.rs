@@ -4,7 +4,7 @@
 pub mod kernels;
 
 use pcadlang::Model;
-use pcadlang::infer::RunOptions;
+use pcadlang::infer::{Latent, Neighbours, RunOptions};
 use std::collections::BTreeMap;
 
 /// Draws by column, all chains one after the other.
@@ -24,6 +24,12 @@ pub fn run_with(text: &str, options: &RunOptions, chains: usize, threads: usize)
         draws.entry(name).or_default().extend(values);
     }
     draws
+}
+
+/// Three draws from the prior, which have nothing to do with the data: neighbours that mislead.
+pub fn wrong_neighbours(model: &Model) -> Neighbours {
+    let draw = |i| Latent::all(&model.simulate(9, i).unwrap_or_else(|e| panic!("{e}")));
+    Neighbours::new((0..3).map(draw).collect(), &(3..40).map(draw).collect::<Vec<_>>())
 }
 
 pub fn mean(xs: &[f64]) -> f64 {

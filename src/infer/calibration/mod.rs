@@ -16,6 +16,7 @@ pub use geweke::{Geweke, GewekeRow, geweke};
 pub use sampler::{KernelSampler, PlanSampler, Sampler};
 pub use sbc::{RANKS, Sbc, SbcRow, sbc};
 
+use super::parallel::in_parallel;
 use super::plan::ChainError;
 use crate::trace::Limits;
 
@@ -74,13 +75,7 @@ impl From<Box<crate::lang::error::RunError>> for CalibrationError {
 fn each<T: Send>(
     settings: &Settings,
     indices: std::ops::Range<u32>,
-    one: impl Fn(u32) -> Result<T, CalibrationError> + Sync,
+    one: impl Fn(u32) -> Result<T, CalibrationError> + Sync + Send,
 ) -> Result<Vec<T>, CalibrationError> {
-    use rayon::prelude::*;
-    let all: Vec<Result<T, CalibrationError>> =
-        match rayon::ThreadPoolBuilder::new().num_threads(settings.threads.max(1)).build() {
-            Ok(pool) => pool.install(|| indices.into_par_iter().with_max_len(1).map(&one).collect()),
-            Err(_) => indices.map(one).collect(),
-        };
-    all.into_iter().collect()
+    in_parallel(settings.threads.max(1), indices.collect(), one).into_iter().collect()
 }

@@ -6,7 +6,7 @@
 
 use super::{CalibrationError, Settings};
 use crate::infer::plan::ChainError;
-use crate::infer::{StartError, init::NoStart};
+use crate::infer::{StartError, attempts};
 use crate::lang::code::{Code, Observed};
 use crate::lang::value::Value;
 use crate::rng::{Purpose, StreamKey};
@@ -41,18 +41,11 @@ pub(super) fn simulate(code: &Arc<Code>, settings: &Settings, index: u32) -> Res
 /// reject such states, so they are drawn again here.
 pub(in crate::infer) fn state(code: &Arc<Code>, limits: Limits, seed: u64, index: u32) -> Result<Trace, ChainError> {
     let key = StreamKey::new(seed, index, Purpose::TRUTH);
-    let mut last = None;
-    for step in 0..RETRIES {
-        match Trace::simulate(Arc::clone(code), Draws { key, step, lane: 0 }, limits) {
-            Ok(trace) => return Ok(trace),
-            Err(e) if e.is_recoverable() => last = Some(e),
-            Err(e) => return Err(e.into()),
-        }
-    }
-    Err(ChainError::Start(match last {
-        Some(e) => StartError::Run(e),
-        None => StartError::Impossible(NoStart::default()),
-    }))
+    let draw = |step| Trace::simulate(Arc::clone(code), Draws { key, step, lane: 0 }, limits);
+    attempts(RETRIES, draw).map_err(|e| match e.is_recoverable() {
+        true => ChainError::Start(StartError::Run(e)),
+        false => ChainError::Run(e),
+    })
 }
 
 fn with_data(mut trace: Trace, settings: &Settings, index: u32) -> Result<Simulated, CalibrationError> {

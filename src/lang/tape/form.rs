@@ -181,7 +181,7 @@ impl Form {
         &self,
         dist: &Dist,
         params: Vec<f64>,
-        by_matrix: impl FnOnce(&Args) -> Option<Option<(usize, Adjoint)>>,
+        by_matrix: impl FnOnce(&Args) -> Option<Adjoint>,
         buffer: &[f64],
         adjoints: &mut [f64],
     ) -> bool {
@@ -190,14 +190,14 @@ impl Form {
         let values: SmallVec<[&Value; 4]> = values.iter().collect();
         let a = Args { builtin: &m.builtin, values: &values };
         let mut pulled = density::by_arguments(&a, dist, &params);
-        if let Some((i, _)) = density::matrix(&a, dist) {
-            if let Some(p) = pulled.get_mut(i) {
-                *p = Adjoint::Zero;
-            }
+        if let Some(i) = density::matrix(dist, a.values)
+            && let Some(p) = pulled.get_mut(i)
+        {
+            *p = Adjoint::Zero;
             if m.args.get(i).is_some_and(|f| !f.is_fixed()) {
                 match by_matrix(&a) {
-                    Some(Some((i, by))) if i < pulled.len() => pulled[i] = by,
-                    _ => return false,
+                    Some(by) => *p = by,
+                    None => return false,
                 }
             }
         }

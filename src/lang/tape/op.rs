@@ -171,12 +171,9 @@ fn pull_score(dist: &Form, x: &Form, observed: bool, v: &[f64], g: &mut [f64], w
     // What is observed is the value, however a choice would be stored.
     let scored: Dist = if observed { Dist::clone(d).centred() } else { Dist::clone(d) };
     let by_matrix = |a: &crate::lang::builtins::Args| {
-        density::by_matrix(a, &scored, &stored, &[]).map(|found| {
-            found.map(|(i, mut by)| {
-                by.scale(weight);
-                (i, by)
-            })
-        })
+        let mut by = density::by_matrix(a, &scored, &density::by_factor(&scored, &stored, &[])?)?;
+        by.scale(weight);
+        Some(by)
     };
     Some(x.pull(&by_x, v, g) && dist.pull_dist(d, params, by_matrix, v, g))
 }

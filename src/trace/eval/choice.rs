@@ -272,6 +272,10 @@ impl Graph {
         let (new, from_prior) = match change {
             None => (None, false),
             Some(Change::Set(d)) => (Some(d), false),
+            Some(Change::Value(d)) => match dist.unrealise(&d) {
+                Some(x) => (Some(x), false),
+                None => return Err(self.type_error(code, n, "the value does not fit the choice".into())),
+            },
             Some(Change::Resample) => {
                 let hash = self.choice_hash(code, n);
                 (Some(self.drawn_now(code, n, dist, hash)?), true)
@@ -341,8 +345,9 @@ impl Graph {
             for i in range {
                 let one = dist.element(i);
                 let new = match change {
-                    Change::Set(d) if *element == NONE => self::element(d, i),
+                    Change::Set(d) | Change::Value(d) if *element == NONE => self::element(d, i),
                     Change::Set(d) => Some(d.clone()),
+                    Change::Value(d) => one.unrealise(d),
                     Change::Free(y) => {
                         let (x, jacobian) = one.stored_support().from_free(y);
                         self.jacobian.add(jacobian);

@@ -159,6 +159,15 @@ impl Graph {
         self.likelihood = likelihood;
     }
 
+    /// Adds an observation's or factor's score to a sum.
+    pub(crate) fn put_score(&self, n: NodeId, to: &mut ExactSum) {
+        let node = &self.nodes[n as usize];
+        match node.side.as_deref() {
+            Some(Side::Total(t)) if node.score == 0.0 => to.merge(&t.sum),
+            _ => to.add(node.score),
+        }
+    }
+
     /// Takes an observation's or factor's score out of a sum.
     pub(crate) fn take_score(&self, n: NodeId, from: &mut ExactSum) {
         let node = &self.nodes[n as usize];

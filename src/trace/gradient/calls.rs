@@ -4,7 +4,6 @@ use super::Reverse;
 use crate::lang::adjoint::Adjoint;
 use crate::lang::builtins::{Args, Builtin, Kind, Pulled};
 use crate::lang::code::{Callee, Op, Operand};
-use crate::lang::density;
 use crate::lang::value::Value;
 use crate::trace::demand::Failure;
 use crate::trace::node::*;
@@ -20,7 +19,9 @@ impl Reverse<'_> {
         by: &Adjoint,
     ) -> Result<(), Failure> {
         let values = self.values(self.graph.nodes[n as usize].frame, args);
-        let pulled = self.by_call(n, &Args { builtin, values: &values }, &self.graph.nodes[n as usize].value, by)?;
+        let a = Args { builtin, values: &values };
+        let operand = |i: usize| args.get(i).copied();
+        let pulled = self.by_call(n, &a, &self.graph.nodes[n as usize].value, by, operand)?;
         self.give_arguments(n, builtin, args.iter().map(|o| Some(*o)), pulled)
     }
 
@@ -38,7 +39,8 @@ impl Reverse<'_> {
         let mut deps = Deps::new();
         let value = |o: &Option<Operand>| o.map_or(&Value::Unit, |o| g.plain(self.code, frame, o, &mut deps));
         let values: SmallVec<[&Value; 8]> = operands.iter().map(value).collect();
-        let pulled = self.by_call(n, &Args { builtin, values: &values }, &g.nodes[n as usize].value, by)?;
+        let operand = |i: usize| operands.get(i).copied().flatten();
+        let pulled = self.by_call(n, &Args { builtin, values: &values }, &g.nodes[n as usize].value, by, operand)?;
         self.give_arguments(n, builtin, operands, pulled)?;
         Ok(true)
     }
@@ -65,20 +67,28 @@ impl Reverse<'_> {
             if by.is_zero() {
                 continue;
             }
-            let pulled = self.by_call(n, &Args { builtin, values: &[&x] }, &y, &by)?;
+            let pulled = self.by_call(n, &Args { builtin, values: &[&x] }, &y, &by, |_| None)?;
             whole.add_position(xs, i, pulled.into_iter().next().unwrap_or_default());
         }
         self.give(frame, *over, whole);
         Ok(())
     }
 
-    /// The adjoints of a call's arguments.
-    fn by_call(&self, n: NodeId, a: &Args, value: &Value, by: &Adjoint) -> Result<Pulled, Failure> {
+    /// The adjoints of a call's arguments, which come from these operands.
+    fn by_call(
+        &self,
+        n: NodeId,
+        a: &Args,
+        value: &Value,
+        by: &Adjoint,
+        operand: impl Fn(usize) -> Option<Operand>,
+    ) -> Result<Pulled, Failure> {
         let unknown = || self.no_derivative(n, &format!("`{}`", a.builtin.full_name()));
         match (a.builtin.kind, a.builtin.derivative, value) {
             (Kind::Distribution(_), _, Value::Dist(d)) => {
-                let params = by.numbers(if let Adjoint::Array(gs) = by { gs.len() } else { 0 });
-                Ok(density::by_arguments(a, d, &params))
+                let frame = self.graph.nodes[n as usize].frame;
+                let source = |i: usize| operand(i).and_then(|o| self.source(frame, o));
+                self.by_distribution(n, a, d, by, |i| source(i).is_some_and(|s| self.is_active(s)))
             }
             (_, derivative, value) => derivative.pull(a, value, by).ok_or_else(unknown),
         }

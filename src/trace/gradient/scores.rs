@@ -9,6 +9,7 @@ use crate::lang::density;
 use crate::lang::value::Value;
 use crate::trace::demand::Failure;
 use crate::trace::node::*;
+use smallvec::SmallVec;
 
 impl Reverse<'_> {
     /// The nodes that the score of a choice, observation or factor is computed from, but for the choice itself.
@@ -101,9 +102,8 @@ impl Reverse<'_> {
             DistSpec::Family { builtin, args } => {
                 let builtin = self.code.builtins.get(*builtin);
                 let values = self.values(frame, args);
-                let a = Args { builtin, values: &values };
-                let mut pulled = density::by_arguments(&a, dist, &params);
-                if let Some(p) = density::matrix(&a, dist).and_then(|(i, _)| pulled.get_mut(i)) {
+                let mut pulled = density::by_arguments(&Args { builtin, values: &values }, dist, &params);
+                if let Some(p) = density::matrix(dist, &values).and_then(|i| pulled.get_mut(i)) {
                     *p = Adjoint::Zero;
                 }
                 self.give_arguments(n, builtin, args.iter().map(|o| Some(*o)), pulled)?;
@@ -111,10 +111,9 @@ impl Reverse<'_> {
         }
         Ok(())
     }
-}
 
-impl Reverse<'_> {
-    /// Hands the derivatives by a covariance, `weight` times, to what it was computed from; [`density::by_arguments`] leaves it out.
+    /// Hands the derivatives by a covariance or a factor of one, `weight` times, to what it was computed from; [`density::by_arguments`]
+    /// leaves it out.
     pub(super) fn give_matrix(
         &mut self,
         n: NodeId,
@@ -124,19 +123,60 @@ impl Reverse<'_> {
         by_value: &[f64],
         weight: f64,
     ) -> Result<(), Failure> {
-        let DistSpec::Family { builtin, args } = spec else { return Ok(()) };
         let frame = self.graph.nodes[n as usize].frame;
-        let values = self.values(frame, args);
-        let a = Args { builtin: self.code.builtins.get(*builtin), values: &values };
-        let Some((i, _)) = density::matrix(&a, dist) else { return Ok(()) };
-        let Some(source) = args.get(i).and_then(|o| self.source(frame, *o)).filter(|s| self.is_active(*s)) else {
-            return Ok(());
+        let values = self.values(frame, spec.operands());
+        let i = match spec {
+            DistSpec::Value(_) => density::matrix(dist, &[]).map(|_| 0),
+            DistSpec::Family { .. } => density::matrix(dist, &values),
         };
-        let Some(Some((_, mut by))) = density::by_matrix(&a, dist, stored, by_value) else {
-            return Err(self.no_derivative(n, &format!("the covariance of `{}`", dist.name())));
+        let source = i.and_then(|i| spec.operands().get(i)).and_then(|o| self.source(frame, *o));
+        let Some(source) = source.filter(|s| self.is_active(*s)) else { return Ok(()) };
+        let Some(mut by) = density::by_factor(dist, stored, by_value) else {
+            return Err(self.no_matrix(n, dist));
         };
-        by.scale(weight);
+        by.iter_mut().for_each(|g| *g *= weight);
+        let by = match spec {
+            // Behind the parameters: what makes the distribution takes them apart.
+            DistSpec::Value(_) => {
+                let mut all = vec![0.0; dist.param_count()];
+                all.append(&mut by);
+                Some(Adjoint::Array(all))
+            }
+            DistSpec::Family { builtin, .. } => {
+                density::by_matrix(&Args { builtin: self.code.builtins.get(*builtin), values: &values }, dist, &by)
+            }
+        };
+        let Some(by) = by else { return Err(self.no_matrix(n, dist)) };
         self.give_node(source, by);
         Ok(())
+    }
+
+    /// The adjoints of the arguments of a distribution that is a value: its parameters, and behind them the factor of its
+    /// covariance. `wanted` says whether an argument leads anywhere.
+    pub(super) fn by_distribution(
+        &self,
+        n: NodeId,
+        a: &Args,
+        dist: &Dist,
+        by: &Adjoint,
+        wanted: impl Fn(usize) -> bool,
+    ) -> Result<SmallVec<[Adjoint; 4]>, Failure> {
+        let all = by.numbers(if let Adjoint::Array(gs) = by { gs.len() } else { 0 });
+        let Some(i) = density::matrix(dist, a.values) else { return Ok(density::by_arguments(a, dist, &all)) };
+        let (params, factor) = all.split_at(dist.param_count().min(all.len()));
+        let mut pulled = density::by_arguments(a, dist, params);
+        if let Some(p) = pulled.get_mut(i) {
+            *p = match factor {
+                _ if !wanted(i) => Adjoint::Zero,
+                // Within a distribution of several, such as `iid`, which hands out parameters only.
+                [] => Adjoint::Unknown,
+                _ => density::by_matrix(a, dist, factor).ok_or_else(|| self.no_matrix(n, dist))?,
+            };
+        }
+        Ok(pulled)
+    }
+
+    fn no_matrix(&self, n: NodeId, dist: &Dist) -> Failure {
+        self.no_derivative(n, &format!("the covariance of `{}`", dist.name()))
     }
 }
