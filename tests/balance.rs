@@ -66,6 +66,16 @@ const STRUCTURE: Case = Case {
     },
 };
 
+/// The same with a surrogate that says something else.
+const SURROGATE: Case = Case {
+    name: "surrogate",
+    text: "assume c ~ flip(0.4);
+           assume x = if c { a ~ categorical([1, 2, 1]); a }
+                      else { b ~ gamma(2, 1); d ~ flip(0.3); if d { b } else { b + 1 } };
+           observe normal(x, 1) = 2 with coarse = normal(x - 0.7, 1.5) as y;",
+    ..STRUCTURE
+};
+
 /// The same address in both branches, with supports of different shape.
 const SHARED: Case = Case {
     name: "shared address",
@@ -247,6 +257,11 @@ fn discrete_choices() {
 #[test]
 fn choices_that_appear_and_vanish() {
     all_balanced(&STRUCTURE, 20_000, kernels::balance::STRUCTURE);
+}
+
+#[test]
+fn surrogates_that_decide_first() {
+    all_balanced(&SURROGATE, 20_000, kernels::balance::SURROGATE);
 }
 
 #[test]

@@ -22,6 +22,49 @@ fn conjugate_normal_by_every_kernel() {
     kernels::exact::CONJUGATE.iter().for_each(|k| conjugate_normal(k));
 }
 
+/// Two stages of acceptance, the first by a surrogate with another mean and width; by hand and by a kernel of the program.
+#[test]
+fn surrogates_leave_the_posterior_as_it_is() {
+    for kernel in kernels::exact::DELAYED {
+        let text = format!(
+            "assume x ~ normal(0, 1); observe normal(x, 0.5) = 2 with coarse = normal(x + 0.4, 0.8) as y;
+             kernel pull(s) {{ let here = value(@x); propose @x ~ normal(0.7 * here + 1, s); }}
+             infer {{ warmup 2000 {{ {kernel}; }} repeat 60000 {{ {kernel}; collect x; }} }}"
+        );
+        let d = run(&text, 1, 2);
+        assert_mean(kernel, &d["x"], 1.6, 0.06);
+        let squares: Vec<f64> = d["x"].iter().map(|x| (x - 1.6) * (x - 1.6)).collect();
+        assert_mean(&format!("{kernel}, variance"), &squares, 0.2, 0.03);
+    }
+}
+
+/// 20,000 draws by slices of two modes, one narrow, follow the distribution as a whole.
+#[test]
+fn slices_have_the_right_distribution() {
+    let density = |x: f64| normal_pdf(x, 0.0, 3.0) * (0.4 * normal_pdf(x, -2.0, 0.3) + 0.6 * normal_pdf(x, 2.0, 1.0));
+    let (low, cells) = (-5.0, 3000);
+    let width = 13.0 / cells as f64;
+    let mut reached = vec![0.0];
+    for i in 0..cells {
+        let a = low + i as f64 * width;
+        reached.push(reached[i] + integrate(density, a, a + width, 4));
+    }
+    let cdf = |x: f64| {
+        let at = ((x - low) / width).clamp(0.0, cells as f64 - 1e-9);
+        let (i, rest) = (at as usize, at.fract());
+        (reached[i] + rest * (reached[i + 1] - reached[i])) / reached[cells]
+    };
+    for kernel in kernels::exact::SLICES {
+        let text = format!(
+            "assume x ~ normal(0, 3); observe mixture([0.4, 0.6], [normal(-2, 0.3), normal(2, 1)]) = x;
+             infer {{ repeat 10000 {{ repeat 8 {{ {kernel}; }} collect x; }} }}"
+        );
+        let d = run(&text, 3, 2);
+        let distance = kolmogorov_smirnov(&d["x"], cdf);
+        assert!(d["x"].len() == 20_000 && distance < 2.5, "{kernel}: {distance}");
+    }
+}
+
 /// The default plan, nothing collected by hand.
 #[test]
 fn conjugate_normal_by_the_default_plan() {
@@ -391,11 +434,26 @@ fn particles_find_both_modes() {
 /// below one the posterior is exact.
 #[test]
 fn simulated_data_stand_in_for_the_likelihood() {
-    let kernel = kernels::exact::SIMULATED[2];
     let text = "assume p ~ beta(1, 1); observe binomial(10, p) = 7;";
-    let infer = format!("infer {{ warmup 500 {{ {kernel}; }} repeat 120000 {{ {kernel}; collect p; }} }}");
-    let d = run(&format!("{text} {infer}"), 1, 2);
-    assert_mean("p by abc", &d["p"], 8.0 / 12.0, 0.03);
-    let squares: Vec<f64> = d["p"].iter().map(|p| p * p).collect();
-    assert_mean("p^2 by abc", &squares, 8.0 * 9.0 / (12.0 * 13.0), 0.04);
+    for (kernel, warmup, steps) in [(2, 500, 120_000), (3, 2, 12_000)] {
+        let kernel = kernels::exact::SIMULATED[kernel];
+        let infer = format!("infer {{ warmup {warmup} {{ {kernel}; }} repeat {steps} {{ {kernel}; collect p; }} }}");
+        let d = run(&format!("{text} {infer}"), 1, 2);
+        assert_mean(&format!("p by {kernel}"), &d["p"], 8.0 / 12.0, 0.03);
+        let squares: Vec<f64> = d["p"].iter().map(|p| p * p).collect();
+        assert_mean(&format!("p^2 by {kernel}"), &squares, 8.0 * 9.0 / (12.0 * 13.0), 0.04);
+    }
+}
+
+/// The share of simulated data that come near enough is estimated without bias: 7 heads of 10 have a probability of 1 / 11.
+#[test]
+fn falling_tolerances_give_the_probability_of_the_data() {
+    let kernel = kernels::exact::SIMULATED[3];
+    let model = pcadlang::Model::from_text(&format!(
+        "assume p ~ beta(1, 1); observe binomial(10, p) = 7; infer {{ repeat 20000 {{ {kernel}; }} }}"
+    ))
+    .unwrap_or_else(|e| panic!("{e}"));
+    let posterior = model.run(&Default::default(), 1, 1).unwrap_or_else(|e| panic!("{e}"));
+    let log = posterior.chains[0].kernels[0].log_evidence.unwrap_or(f64::NAN);
+    assert!((log + 11f64.ln()).abs() < 0.03, "{log}");
 }

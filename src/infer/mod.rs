@@ -24,6 +24,8 @@ pub use chains::run_chains;
 pub use default_plan::default_plan;
 pub use init::{Start, StartError, starts};
 pub use kernel::{At, Kernel, Outcome, Pick, Scope};
-pub use kernels::{Abc, Block, Drift, Elliptical, Gibbs, Hmc, Knn, Mh, Nuts, Optimize, Slice, Smc, Temper};
+pub use kernels::{
+    Abc, AbcSmc, Block, Delayed, Drift, Elliptical, Gibbs, Hmc, Knn, Mh, Nuts, Optimize, Slice, Smc, Temper,
+};
 pub use neighbours::{Banks, Latent, Latents, Neighbours};
 pub use plan::{ChainError, ChainResult, Progress, RunOptions, Watch};

@@ -14,4 +14,5 @@ pub mod load;
 pub mod lower;
 mod slots;
 mod spread;
+mod surrogate;
 pub mod value;

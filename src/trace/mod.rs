@@ -20,6 +20,7 @@ mod query;
 mod save;
 mod select;
 mod spread;
+mod twin;
 
 pub use crate::lang::address::{Address, AddressSegment};
 pub use choices::{Selection, Target};

@@ -10,7 +10,7 @@ const CHOICES: &str = "Selections and starts";
 const MONITORS: &str = "Monitors and reports";
 
 /// What this version checks and documents but cannot run.
-pub(super) const PLANNED: &[&str] = &["delayed", "marginal", "acceptance", "rhat", "ess", "snapshot"];
+pub(super) const PLANNED: &[&str] = &["marginal", "acceptance", "rhat", "ess", "snapshot"];
 
 const fn name(
     name: &'static str,
@@ -81,9 +81,15 @@ pub(super) const TABLE: &[Builtin] = &[
                 "learnt",
                 "The width of a step out, in the unconstrained space; without it, 1, and warm-up adapts it.",
             ),
+            opt(
+                "doubling",
+                Type::Bool,
+                "false",
+                "The interval doubles instead of growing by steps: for slices much wider than `width`.",
+            ),
         ],
         Type::Kernel,
-        "Slice sampling of one number at a time with stepping out (Neal 2003).",
+        "Slice sampling of one number at a time with stepping out or doubling (Neal 2003).",
     ),
     name(
         "hmc",
@@ -116,7 +122,8 @@ pub(super) const TABLE: &[Builtin] = &[
         KERNELS,
         &[INNER, arg("at", Type::Selection, "The observation with a coarse surrogate.")],
         Type::Kernel,
-        "Delayed acceptance: the surrogate decides first, the full likelihood corrects it (Christen and Fox 2005).",
+        "Delayed acceptance: the surrogate of `observe … with coarse = …` decides first; only what passes is judged by the observation \
+         itself (Christen and Fox 2005). Exact whatever the surrogate says, if it is possible wherever the observation is.",
     ),
     name(
         "temper",
@@ -140,7 +147,18 @@ pub(super) const TABLE: &[Builtin] = &[
     name(
         "abc",
         KERNELS,
-        &[INNER, arg("eps", Type::Num, "The largest distance that is accepted.")],
+        &[
+            INNER,
+            arg("eps", Type::Num, "The largest distance that is accepted."),
+            opt(
+                "particles",
+                Type::Int,
+                "none",
+                "Each step draws a whole state by so many particles, as `smc` does, with tolerances that fall to `eps` (Del Moral \
+                 et al. 2012).",
+            ),
+            opt("moves", Type::Int, "1", "How often each particle moves at each tolerance."),
+        ],
         Type::Kernel,
         "Likelihood-free: the kernel inside proposes from the prior, and what it proposes stays if data drawn from it are near those \
          observed, in root mean square (Marjoram et al. 2003).",

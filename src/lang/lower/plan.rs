@@ -240,6 +240,14 @@ impl Lowerer<'_> {
     }
 
     fn kernel_or_start(&mut self, outer: &str, e: &Expr, around: &Around) {
+        if outer == "delayed"
+            && let ExprKind::Call { callee, .. } = &e.kind
+            && let ExprKind::Var(inner) = &callee.kind
+            && ["temper", "smc", "abc", "optimize"].contains(&&**inner)
+        {
+            self.error(format!("`delayed` does not take `{inner}`"), e.span, "not a reversible move of one state")
+                .hint_also("for example delayed(drift(@x), @obs)");
+        }
         if outer != "init" {
             return self.kernel(e, around);
         }

@@ -1,0 +1,155 @@
+//! `delayed(move, at)`: delayed acceptance (Christen & Fox 2005) in the form of surrogate transitions (Liu 2001, section 9.4.3).
+//!
+//! Beside the chain's trace there is a twin, in which the coarse surrogates of the observations at `at` stand in their place. The
+//! kernel inside moves the twin, its own test and proposal ratio included; only what it accepts goes to the chain's trace, where
+//! the ratio (fine change / coarse change) decides. Any kernel that is reversible under the surrogate leaves the
+//! posterior invariant in this way, whatever the surrogate says, as long as it is possible wherever the observation is. The observation
+//! itself is evaluated for what the first stage lets through, and for nothing else.
+
+use crate::infer::kernel::{At, Kernel, Outcome, decide, recoverable};
+use crate::infer::selection::fail;
+use crate::syntax::span::Span;
+use crate::trace::{Selector, Trace, TraceResult};
+use std::sync::Arc;
+
+/// Two-stage acceptance around a reversible kernel.
+pub struct Delayed {
+    kernel: Box<dyn Kernel>,
+    /// The observations whose surrogates decide first.
+    observations: Selector,
+    span: Span,
+    twin: Option<Twin>,
+}
+
+/// The trace under the surrogates, and the state of the chain's trace that it has.
+struct Twin {
+    trace: Trace,
+    of: Arc<()>,
+    revision: u32,
+}
+
+impl Delayed {
+    /// A kernel, and the observations that have surrogates. `span` is where errors point.
+    pub fn new(kernel: Box<dyn Kernel>, observations: Selector, span: Span) -> Self {
+        Delayed { kernel, observations, span, twin: None }
+    }
+
+    /// Brings the twin to the present state.
+    fn follow(&mut self, trace: &mut Trace) -> TraceResult<&mut Twin> {
+        trace.rollback();
+        let (of, revision) = (Arc::clone(trace.identity()), trace.revision());
+        let twin = match self.twin.take() {
+            Some(twin) if Arc::ptr_eq(&twin.of, &of) && twin.revision == revision => {
+                return Ok(self.twin.insert(twin));
+            }
+            Some(mut twin) => {
+                twin.trace.observe_as(trace)?;
+                twin.trace.propose_choices_of(trace)?;
+                twin.trace.commit();
+                twin.trace
+            }
+            None => match trace.under_surrogates(&self.observations)? {
+                Some(twin) => twin,
+                None => {
+                    let mut e = fail(self.span, "delayed: no observation there has a coarse surrogate".into());
+                    e.hint = Some("observe normal(x, 1) = 2 with coarse = normal(x, 2) as y; … delayed(…, @y)".into());
+                    return Err(e);
+                }
+            },
+        };
+        if let Some(extra) = trace.lacks(&twin) {
+            let address = twin.address(extra);
+            return Err(fail(self.span, format!("delayed: only the surrogate asks for the choice {address}")));
+        }
+        Ok(self.twin.insert(Twin { trace: twin, of, revision }))
+    }
+}
+
+/// The log prior and the log likelihood at a power.
+fn tempered(trace: &Trace, power: f64) -> f64 {
+    let likelihood = if power == 0.0 { 0.0 } else { power * trace.log_likelihood() };
+    trace.log_prior() + likelihood
+}
+
+impl Kernel for Delayed {
+    fn name(&self) -> String {
+        format!("delayed {}", self.kernel.name())
+    }
+
+    fn sweep(&mut self, trace: &mut Trace) -> Option<usize> {
+        // What goes wrong shows in the step.
+        self.follow(trace).ok()?;
+        self.kernel.sweep(&mut self.twin.as_mut()?.trace)
+    }
+
+    fn step(&mut self, trace: &mut Trace, at: &At) -> TraceResult<Outcome> {
+        self.follow(trace)?;
+        let Some(twin) = &mut self.twin else { return Ok(Outcome::default()) };
+        let before = tempered(&twin.trace, at.power);
+        let more = trace.choice_count() - twin.trace.choice_count();
+        let inner = self.kernel.step(&mut twin.trace, &At { member: at.member, ..at.within(0) })?;
+        twin.trace.rollback();
+        if inner.accepted == 0 {
+            return Ok(Outcome { site: None, ..inner });
+        }
+        let coarse = tempered(&twin.trace, at.power) - before;
+        let mut outcome = match recoverable(trace.propose_choices_of(&twin.trace))? {
+            None => Outcome { accepted: 0, failed: 1, ..inner },
+            Some(w) => {
+                let fine = w.log_joint - (1.0 - at.power) * w.log_likelihood;
+                // Choices that only the observation asks for stay as they are.
+                let same =
+                    trace.lacks(&twin.trace).is_none() && trace.choice_count() - twin.trace.choice_count() == more;
+                let decided = decide(trace, if same { fine - coarse } else { f64::NEG_INFINITY }, &mut at.stream());
+                Outcome { accepted: decided.accepted.min(inner.accepted), ..inner }
+            }
+        };
+        if outcome.accepted == 0 {
+            twin.trace.propose_choices_of(trace)?;
+            twin.trace.commit();
+        }
+        twin.revision = trace.revision();
+        outcome.site = None;
+        Ok(outcome)
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+    use crate::infer::kernels::Mh;
+    use crate::infer::{Pick, Scope};
+    use crate::model::Model;
+
+    /// The observation runs once for what the surrogate lets through, and not at all for the rest; with and without incremental
+    /// updates the chain is the same.
+    #[test]
+    fn the_observation_is_evaluated_for_what_the_surrogate_accepts() {
+        let text = "assume x ~ normal(0, 3); let far = 1000 * sin(x / 1000);
+                    observe normal(far, 0.3) = 2 with coarse = normal(x, 0.6) as y;";
+        let model = Model::from_text(text).unwrap();
+        let run = |incremental: bool| {
+            let mut trace = model.simulate(1, 0).unwrap();
+            trace.set_incremental(incremental);
+            let at = Selector::Address(crate::trace::Pattern::exact(&trace.observations()[0].0));
+            let inner = Box::new(Mh::new(Scope { selector: Selector::All, pick: Pick::All }));
+            let mut kernel = Delayed::new(inner, at, Span::default());
+            kernel.step(&mut trace, &At::new(1, 0, 0)).unwrap();
+            trace.watch();
+            let (mut states, mut accepted) = (Vec::new(), 0);
+            for i in 1..2000 {
+                accepted += kernel.step(&mut trace, &At::new(1, 0, i)).unwrap().accepted;
+                states.push(trace.log_joint().to_bits());
+                let twin = &kernel.twin.as_ref().unwrap().trace;
+                assert!(twin.stored(twin.all_targets()[0]) == trace.stored(trace.all_targets()[0]));
+            }
+            let fine = &text[text.find("normal(far").unwrap()..];
+            let spans = trace.executed();
+            let evaluated = spans.iter().filter(|s| text[s.start as usize..].starts_with(fine)).count();
+            (states, accepted, evaluated)
+        };
+        let (states, accepted, evaluated) = run(true);
+        assert!(accepted > 100 && (accepted as usize..1000).contains(&evaluated), "{accepted}, {evaluated}");
+        assert_eq!(states, run(false).0);
+    }
+}
