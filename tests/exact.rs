@@ -22,6 +22,43 @@ fn conjugate_normal_by_every_kernel() {
     kernels::exact::CONJUGATE.iter().for_each(|k| conjugate_normal(k));
 }
 
+/// The mean of a component and the labels of three points: a mixture, and a chain in which labels follow each other.
+#[test]
+fn labels_are_summed_out() {
+    let y = [0.3, 1.6, 2.4];
+    let follow = |a: usize, b: usize| if a == b { 0.8 } else { 0.2 };
+    for chain in [false, true] {
+        let prior = |z: [usize; 3]| match chain {
+            false => z.iter().map(|z| [0.6, 0.4][*z]).product::<f64>(),
+            true => [0.6, 0.4][z[0]] * follow(z[0], z[1]) * follow(z[1], z[2]),
+        };
+        let like = |z: [usize; 3], m: f64| {
+            let one = |i: usize| normal_pdf(y[i], if z[i] == 1 { m } else { 0.0 }, 0.7);
+            prior(z) * normal_pdf(m, 1.0, 2.0) * one(0) * one(1) * one(2)
+        };
+        let all = (0..8).map(|i| [i & 1, (i >> 1) & 1, i >> 2]);
+        let sum = |f: &dyn Fn([usize; 3], f64) -> f64| -> f64 {
+            all.clone().map(|z| integrate(|m| f(z, m) * like(z, m), -12.0, 14.0, 2000)).sum()
+        };
+        let total = sum(&|_, _| 1.0);
+        for kernel in kernels::exact::SUMMED_OUT {
+            let prior = if chain { "if i == 0 { 0.4 } else { if z[i - 1] { 0.8 } else { 0.2 } }" } else { "0.4" };
+            let k = if kernel.ends_with(';') { (*kernel).to_owned() } else { format!("{kernel};") };
+            let text = format!(
+                "let y = {y:?}; assume m ~ normal(1, 2);
+                 for i in 0 .. 3 {{ z[i] ~ flip({prior}); observe normal(if z[i] {{ m }} else {{ 0 }}, 0.7) = y[i]; }}
+                 infer {{ warmup 500 {{ {k} }} repeat 15000 {{ {k} collect m, z; }} }}"
+            );
+            let d = run(&text, 1, 2);
+            assert_mean(&format!("{kernel}: m"), &d["m"], sum(&|_, m| m) / total, 0.2);
+            for i in 0..3 {
+                let expected = sum(&|z, _| z[i] as f64) / total;
+                assert_mean(&format!("{kernel}: z[{i}]"), &d[&format!("z[{i}]")], expected, 0.06);
+            }
+        }
+    }
+}
+
 /// Two stages of acceptance, the first by a surrogate with another mean and width; by hand and by a kernel of the program.
 #[test]
 fn surrogates_leave_the_posterior_as_it_is() {
@@ -382,6 +419,57 @@ fn proposals_of_the_program_change_structure() {
     );
     let (yes, no) = (0.4 * normal_pdf(0.5, 1.0, 2.0), 0.6 * normal_pdf(0.5, -1.0, 5f64.sqrt()));
     assert_mean("c", &d["c"], yes / (yes + no), 0.03);
+}
+
+/// Maps of choices by a rule: with a Jacobian that is not 1, of a switch with which choices appear, and of an element picked at
+/// random.
+#[test]
+fn maps_of_the_program_are_paid_for() {
+    let d = run(
+        "assume x ~ normal(0, 1); observe normal(x, 0.5) = 2;
+         kernel scaled() { propose u ~ lognormal(0, 0.5); propose @x = value(@x) * u; propose u = 1 / u; }
+         kernel shifted(s) { propose u ~ normal(0, s); propose @x = value(@x) + u; propose u = -u; }
+         infer { warmup 500 { shifted(0.5); } repeat 40000 { scaled(); shifted(0.5); collect x; } }",
+        1,
+        2,
+    );
+    assert_mean("maps", &d["x"], 1.6, 0.06);
+    let squares: Vec<f64> = d["x"].iter().map(|x| (x - 1.6) * (x - 1.6)).collect();
+    assert_mean("maps, variance", &squares, 0.2, 0.03);
+    let d = run(
+        "assume c ~ flip(0.4); assume a ~ normal(0, 1);
+         assume x = if c { a + 1 } else { d ~ normal(0, 1); a + d - 1 };
+         for i in 0 .. 2 { w[i] ~ normal(0, 1); }
+         observe normal(x + w[0] + w[1], 1) = 0.5;
+         kernel turn() { propose @c = not value(@c); }
+         kernel mirror() { propose i ~ uniform_discrete(0, 1); propose @w[{i}] = 0.5 - value(@w[{i}]); }
+         infer { repeat 60000 { turn(); mirror(); drift(one($continuous), scale = 1); collect c; } }",
+        1,
+        2,
+    );
+    let (yes, no) = (0.4 * normal_pdf(0.5, 1.0, 2.0), 0.6 * normal_pdf(0.5, -1.0, 5f64.sqrt()));
+    assert_mean("c by maps", &d["c"], yes / (yes + no), 0.03);
+}
+
+/// A map that does not lead back, or whose derivatives cannot be known, ends the run with the reason.
+#[test]
+fn maps_that_are_no_involutions_are_caught() {
+    let wrong = [
+        ("propose u ~ lognormal(0, 0.5); propose @x = value(@x) * u;", "applied twice, it takes @x from"),
+        ("propose u ~ normal(0, 1); propose @x = value(@x) + u; propose u = -2 * u;", "an auxiliary variable from"),
+        ("propose @x = 1;", "singular"),
+        ("propose u ~ normal(0, 1); propose @x = twice - value(@x);", "reads choices and constants alone"),
+        ("propose @x ~ normal(0, 1); propose @x = 1;", "draws auxiliary variables only"),
+    ];
+    for (body, expected) in wrong {
+        let text = format!(
+            "assume x ~ normal(1, 1); assume twice = 2 * x; observe normal(x, 1) = 1;
+             kernel bad() {{ {body} }} infer {{ repeat 50 {{ bad(); }} }}"
+        );
+        let run = pcadlang::Model::from_text(&text).unwrap_or_else(|e| panic!("{e}")).run(&Default::default(), 1, 1);
+        let said = run.err().map(|e| e.to_string()).unwrap_or_default();
+        assert!(said.contains(expected), "{body}: {said}");
+    }
 }
 
 /// A climb ends where the density is highest: of a normal posterior at its mean.

@@ -91,18 +91,22 @@ pub(super) fn build(
         return Ok(Built { kernel: Box::new(kernel), signature });
     }
     let mut scope = scope(&first.value, env)?;
-    if *frozen != Selector::Nothing {
-        scope.selector = Selector::Minus(Box::new(scope.selector), Box::new(frozen.clone()));
-    }
+    scope.selector = without(scope.selector, frozen);
     let signature = format!("{} {scope:?}", print_expr(e));
     let kernel: Box<dyn Kernel> = match name {
         "mh" => Box::new(Mh::new(scope)),
         "block" => Box::new(Block::new(scope)),
         "gibbs" => Box::new(Gibbs::new(scope)),
         "elliptical" => Box::new(Elliptical::new(scope)),
-        "hmc" => Box::new(Hmc::new(scope, whole(argument(args, 1, "steps"), "steps", 10, 1, 10_000, env)?, None)),
-        "mala" => Box::new(Hmc::new(scope, 1, None)),
-        "nuts" => Box::new(Nuts::new(scope, whole(argument(args, 1, "max_depth"), "max_depth", 10, 1, 20, env)?)),
+        "hmc" => {
+            let steps = whole(argument(args, 1, "steps"), "steps", 10, 1, 10_000, env)?;
+            Box::new(Hmc::new(scope, steps, None).summing_out(marginal(args, 2, frozen, env)?))
+        }
+        "mala" => Box::new(Hmc::new(scope, 1, None).summing_out(marginal(args, 1, frozen, env)?)),
+        "nuts" => {
+            let depth = whole(argument(args, 1, "max_depth"), "max_depth", 10, 1, 20, env)?;
+            Box::new(Nuts::new(scope, depth).summing_out(marginal(args, 2, frozen, env)?))
+        }
         "knn" => Box::new(Knn::new(scope, neighbours(e, args, options, env)?)),
         "drift" => Box::new(Drift::new(scope, positive(argument(args, 1, "scale"), name, "scale", env)?)),
         "slice" => {
@@ -119,6 +123,19 @@ pub(super) fn build(
 
 const AVAILABLE: &str =
     "mh, block, drift, gibbs, elliptical, hmc, mala, nuts, slice, knn, delayed, temper, smc, abc, optimize";
+
+fn without(selector: Selector, frozen: &Selector) -> Selector {
+    match frozen {
+        Selector::Nothing => selector,
+        _ => Selector::Minus(Box::new(selector), Box::new(frozen.clone())),
+    }
+}
+
+/// The finite choices that a kernel sums out.
+fn marginal(args: &[Arg], place: usize, frozen: &Selector, env: &mut Scope) -> Result<Selector, Box<RunError>> {
+    let Some(e) = argument(args, place, "marginal") else { return Ok(Selector::Nothing) };
+    Ok(without(selector(e, env)?, frozen))
+}
 
 /// The values of the parameters of a declared kernel, by name.
 ///

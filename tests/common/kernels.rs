@@ -42,6 +42,13 @@ pub mod exact {
         "delayed(nuts(@x), @y)",
         "delayed(pull(0.8), @y)",
     ];
+    /// A mixture whose labels are summed out, and a chain of labels that depend on each other.
+    pub const SUMMED_OUT: &[&str] = &[
+        "nuts(@m, marginal = @z)",
+        "hmc(@m, steps = 5, marginal = @z)",
+        "mala(@m, marginal = @z)",
+        "nuts(@m, marginal = @z[0] + @z[1]); gibbs(one(@z));",
+    ];
     pub const BETA_BINOMIAL: &[&str] = &["mh(@p)", "drift(@p)"];
     /// Evidence and structure with particles; likelihood-free.
     pub const SIMULATED: &[&str] = &[
@@ -77,6 +84,7 @@ pub mod exact {
         CONJUGATE,
         SLICES,
         DELAYED,
+        SUMMED_OUT,
         BETA_BINOMIAL,
         SIMULATED,
         DEPENDENT_SUPPORT,
@@ -114,6 +122,15 @@ pub mod balance {
         with_mh!("slice(@p1, width = 2)"),
         "slice(one(@**), width = 0.2, doubling = true)",
     ];
+    /// With labels summed out; by themselves these move everything.
+    pub const MIXTURE: &[&str] = &[
+        "nuts($continuous, marginal = $finite)",
+        "hmc($continuous, steps = 3, marginal = $finite)",
+        "mala($continuous, marginal = $finite)",
+        with_mh!("nuts(@s, marginal = @a)"),
+    ];
+    /// Maps that are their own inverse, declared in the program.
+    pub const MAPS: &[&str] = &["mix { 0.5 => scaled(); 0.5 => split(); }", with_mh!("swap()"), with_mh!("split()")];
     pub const FINITE_SUPPORT: &[&str] = &[
         "mix { 0.5 => mh(one(@**)); 0.5 => block(@**); }",
         "block(@**)",
@@ -195,7 +212,7 @@ pub mod balance {
     pub const NEIGHBOURS_OF_SOME: &[&str] =
         &[with_mh!("knn($continuous, bank = \"b\")"), with_mh!("knn(@c, bank = \"b\")")];
     /// The same choices always.
-    pub const FIXED: &[&[&str]] = &[DISCRETE, SUPPORT, FINITE_SUPPORT, COUNTS, GAUSSIAN, NEIGHBOURS];
+    pub const FIXED: &[&[&str]] = &[DISCRETE, SUPPORT, MIXTURE, MAPS, FINITE_SUPPORT, COUNTS, GAUSSIAN, NEIGHBOURS];
     /// Choices that appear, vanish, change form or are shared.
     pub const CHANGING: &[&[&str]] =
         &[STRUCTURE, SURROGATE, SHARED, ELEMENTS, SHARED_GROUPS, NEIGHBOURS, NEIGHBOURS_OF_SOME];

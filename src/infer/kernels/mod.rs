@@ -8,6 +8,7 @@ mod drift;
 mod elliptical;
 mod gibbs;
 mod hamiltonian;
+mod involution;
 mod knn;
 mod mh;
 pub(crate) mod own;

@@ -10,7 +10,7 @@ const CHOICES: &str = "Selections and starts";
 const MONITORS: &str = "Monitors and reports";
 
 /// What this version checks and documents but cannot run.
-pub(super) const PLANNED: &[&str] = &["marginal", "acceptance", "rhat", "ess", "snapshot"];
+pub(super) const PLANNED: &[&str] = &["acceptance", "rhat", "ess", "snapshot"];
 
 const fn name(
     name: &'static str,
@@ -23,6 +23,13 @@ const fn name(
 }
 
 const SEL: Arg = arg("sel", Type::Selection, "The choices it moves.");
+const MARGINAL: Arg = opt(
+    "marginal",
+    Type::Selection,
+    "none",
+    "Finite discrete choices that are summed out of the density it sees, then drawn given the rest. Those that share no \
+     observation are summed one by one, others jointly.",
+);
 const INNER: Arg = arg("move", Type::Kernel, "The kernel inside.");
 const X: Arg = arg("x", Type::Any, "A number of the model, as in `collect`.");
 
@@ -94,18 +101,24 @@ pub(super) const TABLE: &[Builtin] = &[
     name(
         "hmc",
         KERNELS,
-        &[SEL, opt("steps", Type::Int, "10", "The leapfrog steps of one proposal.")],
+        &[SEL, opt("steps", Type::Int, "10", "The leapfrog steps of one proposal."), MARGINAL],
         Type::Kernel,
         "Hamiltonian Monte Carlo; step size and metric are adapted in warm-up (Neal 2011).",
     ),
     name(
         "nuts",
         KERNELS,
-        &[SEL, opt("max_depth", Type::Int, "10", "At most 2 to this power leapfrog steps.")],
+        &[SEL, opt("max_depth", Type::Int, "10", "At most 2 to this power leapfrog steps."), MARGINAL],
         Type::Kernel,
         "The No-U-Turn sampler (Hoffman and Gelman 2014).",
     ),
-    name("mala", KERNELS, &[SEL], Type::Kernel, "The Metropolis-adjusted Langevin algorithm: one gradient a proposal."),
+    name(
+        "mala",
+        KERNELS,
+        &[SEL, MARGINAL],
+        Type::Kernel,
+        "The Metropolis-adjusted Langevin algorithm: one gradient a proposal.",
+    ),
     name(
         "knn",
         KERNELS,
@@ -169,13 +182,6 @@ pub(super) const TABLE: &[Builtin] = &[
         &[SEL, opt("steps", Type::Int, "100", "The number of gradient steps.")],
         Type::Kernel,
         "Climbs to a mode of the posterior; for a start, or an answer in a hurry. Not a sampler.",
-    ),
-    name(
-        "marginal",
-        CHOICES,
-        &[SEL],
-        Type::Selection,
-        "In hmc and nuts: the selected finite discrete choices are summed out of the density.",
     ),
     name(
         "one",

@@ -111,8 +111,20 @@ impl Lowerer<'_> {
                     self.error("`propose` belongs in a kernel", s.span, "outside of one")
                         .hint_also("kernel name(…) { … propose @x ~ d; … }");
                 }
-                self.selection(target, &around.names.clone());
                 self.plan_expr(dist, around);
+                match &target.kind {
+                    // An auxiliary variable of a map.
+                    ExprKind::Var(name) if around.in_kernel => around.names.push(Arc::clone(name)),
+                    _ => self.selection(target, &around.names.clone()),
+                }
+            }
+            KStmtKind::Map { target, value } => {
+                if !around.in_kernel {
+                    self.error("`propose` belongs in a kernel", s.span, "outside of one")
+                        .hint_also("kernel name(…) { … propose @x = e; … }");
+                }
+                self.selection(target, &around.names.clone());
+                self.plan_expr(value, around);
             }
             KStmtKind::Let { name, expr } => {
                 self.plan_expr(expr, around);

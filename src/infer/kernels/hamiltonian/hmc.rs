@@ -1,13 +1,15 @@
 //! `hmc(sel, steps)` and `mala(sel)`: trajectories of a fixed number of leapfrog steps (Neal 2011).
 
 use super::{Adaptation, DIVERGENT, System, system};
-use crate::infer::kernel::{At, Kernel, Outcome, Registered, Scope, accepts};
-use crate::trace::{Trace, TraceResult};
+use crate::infer::kernel::{At, Kernel, Outcome, Pick, Registered, Scope, accepts};
+use crate::trace::{Selector, Trace, TraceResult};
 
 /// Hamiltonian Monte Carlo; with one step it is the Metropolis-adjusted Langevin algorithm.
 #[derive(Clone, Debug)]
 pub struct Hmc {
     scope: Registered,
+    /// Finite choices that are summed out.
+    summed: Registered,
     steps: u32,
     adaptation: Adaptation,
 }
@@ -17,7 +19,18 @@ impl Hmc {
     pub fn new(scope: Scope, steps: u32, step: Option<f64>) -> Self {
         // The best acceptance of long trajectories, and of Langevin steps (Roberts & Rosenthal 1998, Beskos et al. 2013).
         let target = if steps == 1 { 0.574 } else { 0.8 };
-        Hmc { scope: Registered::new(scope), steps: steps.max(1), adaptation: Adaptation::new(target, step) }
+        Hmc {
+            scope: Registered::new(scope),
+            summed: Registered::nothing(),
+            steps: steps.max(1),
+            adaptation: Adaptation::new(target, step),
+        }
+    }
+
+    /// The same with these finite choices summed out of the density that it sees.
+    #[must_use]
+    pub fn summing_out(self, choices: Selector) -> Self {
+        Hmc { summed: Registered::new(Scope { selector: choices, pick: Pick::All }), ..self }
     }
 }
 
@@ -29,7 +42,10 @@ impl Kernel for Hmc {
     fn step(&mut self, trace: &mut Trace, at: &At) -> TraceResult<Outcome> {
         let mut rng = at.stream();
         let (targets, _) = self.scope.members(trace, at, &mut rng);
-        let Some((mut system, here)) = System::begin(trace, at, &targets)? else { return Ok(Outcome::default()) };
+        let sites = self.summed.members(trace, at, &mut rng).0;
+        let Some((mut system, here)) = System::begin(trace, at, &targets, &sites)? else {
+            return Ok(Outcome::default());
+        };
         let step = self.adaptation.step(&mut system, &here, at.adapting, &mut rng)?;
         // Of uneven length, so that no trajectory comes back to where it began again and again.
         let step = step * (0.9 + 0.2 * rng.uniform());

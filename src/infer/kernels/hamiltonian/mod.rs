@@ -9,6 +9,7 @@ mod adapt;
 mod hmc;
 mod nuts;
 mod optimize;
+mod summed;
 mod system;
 
 pub use hmc::Hmc;

@@ -2,15 +2,17 @@
 //! generalised stopping rule, checked across subtrees too (Betancourt 2017; as Stan has it).
 
 use super::{Adaptation, DIVERGENT, Momentum, Point, System, system};
-use crate::infer::kernel::{At, Kernel, Outcome, Registered, Scope};
+use crate::infer::kernel::{At, Kernel, Outcome, Pick, Registered, Scope};
 use crate::num::log_sum_exp;
 use crate::rng::Stream;
-use crate::trace::{Trace, TraceResult};
+use crate::trace::{Selector, Trace, TraceResult};
 
 /// The No-U-Turn sampler.
 #[derive(Clone, Debug)]
 pub struct Nuts {
     scope: Registered,
+    /// Finite choices that are summed out.
+    summed: Registered,
     max_depth: u32,
     adaptation: Adaptation,
 }
@@ -18,7 +20,18 @@ pub struct Nuts {
 impl Nuts {
     /// The kernel for these choices; a trajectory doubles at most `max_depth` times.
     pub fn new(scope: Scope, max_depth: u32) -> Self {
-        Nuts { scope: Registered::new(scope), max_depth, adaptation: Adaptation::new(0.8, None) }
+        Nuts {
+            scope: Registered::new(scope),
+            summed: Registered::nothing(),
+            max_depth,
+            adaptation: Adaptation::new(0.8, None),
+        }
+    }
+
+    /// The same with these finite choices summed out of the density that it sees.
+    #[must_use]
+    pub fn summing_out(self, choices: Selector) -> Self {
+        Nuts { summed: Registered::new(Scope { selector: choices, pick: Pick::All }), ..self }
     }
 }
 
@@ -136,7 +149,10 @@ impl Kernel for Nuts {
     fn step(&mut self, trace: &mut Trace, at: &At) -> TraceResult<Outcome> {
         let mut rng = at.stream();
         let (targets, _) = self.scope.members(trace, at, &mut rng);
-        let Some((mut system, here)) = System::begin(trace, at, &targets)? else { return Ok(Outcome::default()) };
+        let sites = self.summed.members(trace, at, &mut rng).0;
+        let Some((mut system, here)) = System::begin(trace, at, &targets, &sites)? else {
+            return Ok(Outcome::default());
+        };
         let step = self.adaptation.step(&mut system, &here, at.adapting, &mut rng)?;
         let mass = self.adaptation.inverse_mass.clone();
         let momentum = system::draw(&mass, &mut rng);

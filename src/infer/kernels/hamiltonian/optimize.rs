@@ -82,7 +82,7 @@ impl Kernel for Optimize {
     fn step(&mut self, trace: &mut Trace, at: &At) -> TraceResult<Outcome> {
         let mut rng = at.stream();
         let (targets, _) = self.scope.members(trace, at, &mut rng);
-        let Some((mut system, begun)) = System::begin(trace, at, &targets)? else { return Ok(Outcome::default()) };
+        let Some((mut system, begun)) = System::begin(trace, at, &targets, &[])? else { return Ok(Outcome::default()) };
         let mut here = begun.clone();
         let mut past: VecDeque<Pair> = VecDeque::new();
         for _ in 0..self.steps {

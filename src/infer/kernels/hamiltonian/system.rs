@@ -1,5 +1,6 @@
 //! The dynamical system behind a trace: positions, densities and forces, and leapfrog steps.
 
+use super::summed::Summed;
 use crate::infer::kernel::{At, recoverable};
 use crate::rng::Stream;
 use crate::trace::{Change, Target, Trace, TraceResult};
@@ -19,20 +20,27 @@ pub(super) type Momentum = Vec<f64>;
 
 /// A trace as a system; proposals are pending until [`System::settle`].
 pub(super) struct System<'a> {
-    trace: &'a mut Trace,
-    at: &'a At,
-    targets: Vec<Target>,
+    pub(super) trace: &'a mut Trace,
+    pub(super) at: &'a At,
+    pub(super) targets: Vec<Target>,
     /// By target: where its coordinates are.
-    ranges: Vec<Range<usize>>,
+    pub(super) ranges: Vec<Range<usize>>,
     jacobian: f64,
+    pub(super) summed: Option<Summed>,
 }
 
 impl<'a> System<'a> {
-    /// The continuous ones of some choices, and where they are. `None` if there are none, or the density there has no slope.
+    /// The continuous ones of some choices, and where they are; `sites` are summed out. `None` if there are no continuous ones,
+    /// or the density there has no slope.
     ///
     /// # Errors
-    /// An operation that has no derivative.
-    pub fn begin(trace: &'a mut Trace, at: &'a At, all: &[Target]) -> TraceResult<Option<(Self, Point)>> {
+    /// An operation that has no derivative; choices that cannot be summed out.
+    pub fn begin(
+        trace: &'a mut Trace,
+        at: &'a At,
+        all: &[Target],
+        sites: &[Target],
+    ) -> TraceResult<Option<(Self, Point)>> {
         trace.rollback();
         let mut system = System {
             trace,
@@ -40,6 +48,7 @@ impl<'a> System<'a> {
             targets: Vec::with_capacity(all.len()),
             ranges: Vec::with_capacity(all.len()),
             jacobian: 0.0,
+            summed: None,
         };
         let mut y = Vec::with_capacity(all.len());
         for t in all {
@@ -51,6 +60,9 @@ impl<'a> System<'a> {
         }
         if y.is_empty() {
             return Ok(None);
+        }
+        if !sites.is_empty() {
+            return Ok(system.sum_out(sites, y)?.map(|point| (system, point)));
         }
         let mut point = Point { y, gradient: Vec::new(), log_density: 0.0 };
         system.force(&mut point)?;
@@ -76,6 +88,9 @@ impl<'a> System<'a> {
     pub fn go(&mut self, y: Vec<f64>, force: bool) -> TraceResult<Option<Point>> {
         if y.iter().any(|x| !x.is_finite()) {
             return Ok(None);
+        }
+        if self.summed.is_some() {
+            return self.go_summed(y, force);
         }
         let parts = self.ranges.iter().map(|r| y[r.clone()].to_vec());
         let changes: Vec<(Target, Change)> = self.targets.iter().copied().zip(parts.map(Change::Free)).collect();
@@ -109,8 +124,11 @@ impl<'a> System<'a> {
         Ok(Some((to, p)))
     }
 
-    /// Makes a place the state of the trace, or leaves it where it was.
+    /// Makes a place the state of the trace, or leaves it where it was; draws what was summed out.
     pub fn settle(mut self, to: Option<&Point>) -> TraceResult<bool> {
+        if let Some(summed) = self.summed.take() {
+            return self.settle_summed(summed, to);
+        }
         match to {
             Some(point) => {
                 let there = self.go(point.y.clone(), false)?.is_some();

@@ -1,0 +1,144 @@
+//! Densities and forces with finite choices summed out, and their draw from the conditional afterwards.
+//!
+//! A place is looked at once for each joint value of the largest group of choices (see [`Sums`]), all groups at a value of
+//! theirs at a time. The force is the mean, over the conditional of the choices, of that of the log joint. Drawing the choices
+//! from that conditional at the end leaves the joint density of both invariant.
+
+use super::{Point, System};
+use crate::infer::kernel::recoverable;
+use crate::infer::selection::fail;
+use crate::num::log_sum_exp;
+use crate::rng::Stream;
+use crate::trace::{Change, Sums, Target, TraceResult, Weight};
+use std::sync::Arc;
+
+/// What a system sums out.
+#[derive(Debug)]
+pub(super) struct Summed {
+    sums: Arc<Sums>,
+    /// Where the system began, and the log density there.
+    start: Vec<f64>,
+    origin: f64,
+}
+
+/// A place with all choices that are summed out at each of their values.
+struct View {
+    log_density: f64,
+    /// By group and joint value: the log probability given the place.
+    conditional: Vec<Vec<f64>>,
+}
+
+impl System<'_> {
+    /// Sums choices out from now on; `None` if the density at the present place has no slope then.
+    pub(super) fn sum_out(&mut self, sites: &[Target], y: Vec<f64>) -> TraceResult<Option<Point>> {
+        let sums = Arc::new(self.trace.sums(sites)?);
+        self.summed = Some(Summed { sums, start: y.clone(), origin: 0.0 });
+        let Some(mut point) = self.go(y, true)? else { return Ok(None) };
+        self.trace.rollback();
+        if let Some(summed) = &mut self.summed {
+            summed.origin = point.log_density;
+        }
+        point.log_density = 0.0;
+        Ok(Some(point))
+    }
+
+    /// Goes to a place, with the choices at joint values given by group.
+    fn put(&mut self, sums: &Sums, y: &[f64], value: impl Fn(usize) -> usize) -> TraceResult<Option<Weight>> {
+        let free = |r: &std::ops::Range<usize>| Change::Free(y[r.clone()].to_vec());
+        let mut changes: Vec<_> = self.targets.iter().copied().zip(self.ranges.iter().map(free)).collect();
+        changes.extend(sums.changes(value));
+        let w = recoverable(self.trace.propose(&changes, self.at.draws(0)))?;
+        Ok(w.filter(|w| w.appeared + w.vanished == 0))
+    }
+
+    fn view(&mut self, sums: &Sums, y: &[f64]) -> TraceResult<Option<View>> {
+        let counts: Vec<usize> = sums.counts().collect();
+        let mut conditional: Vec<Vec<f64>> = counts.iter().map(|n| Vec::with_capacity(*n)).collect();
+        let (mut log_density, mut jacobian, mut terms) = (0.0, 0.0, Vec::new());
+        for k in 0..sums.passes() {
+            let Some(w) = self.put(sums, y, |i| if k < counts[i] { k } else { 0 })? else { return Ok(None) };
+            let base = self.trace.parts(sums, self.at.power, &mut terms);
+            if k == 0 {
+                (log_density, jacobian) = (base + w.log_jacobian, w.log_jacobian);
+            } else if w.log_jacobian.to_bits() != jacobian.to_bits() {
+                let message = "the bounds of a choice depend on one that is summed out";
+                return Err(fail(Default::default(), message.into()));
+            }
+            let open = conditional.iter_mut().zip(&terms).zip(&counts).filter(|(_, n)| k < **n);
+            open.for_each(|((c, t), _)| c.push(*t));
+        }
+        for c in &mut conditional {
+            let total = log_sum_exp(c);
+            log_density += total;
+            c.iter_mut().for_each(|t| *t -= total);
+        }
+        Ok(log_density.is_finite().then_some(View { log_density, conditional }))
+    }
+
+    /// As [`System::go`], with the choices summed out; which of their values is pending is of no account.
+    pub(super) fn go_summed(&mut self, y: Vec<f64>, force: bool) -> TraceResult<Option<Point>> {
+        let Some(summed) = &self.summed else { return Ok(None) };
+        let (sums, origin) = (Arc::clone(&summed.sums), summed.origin);
+        let Some(view) = self.view(&sums, &y)? else { return Ok(None) };
+        let mut gradient = Vec::new();
+        if force {
+            gradient = vec![0.0; y.len()];
+            let mut part = Vec::with_capacity(y.len());
+            for k in (0..sums.passes()).rev() {
+                if k + 1 < sums.passes() {
+                    let value = |i: usize| if k < view.conditional[i].len() { k } else { 0 };
+                    if self.put(&sums, &y, value)?.is_none() {
+                        return Ok(None);
+                    }
+                }
+                let weight = |n: u32| match sums.group_of(n) {
+                    Some(i) => view.conditional[i].get(k).map_or(0.0, |l| libm::exp(*l)),
+                    None => f64::from(u8::from(k == 0)),
+                };
+                part.clear();
+                self.trace.weighted_gradient(&self.targets, self.at.power, &weight, &mut part)?;
+                gradient.iter_mut().zip(&part).for_each(|(g, p)| *g += p);
+            }
+            // Each pass has the Jacobians in it, and one is enough.
+            part.clear();
+            self.trace.weighted_gradient(&self.targets, self.at.power, &|_| 0.0, &mut part)?;
+            let more = sums.passes() as f64 - 1.0;
+            gradient.iter_mut().zip(&part).for_each(|(g, p)| *g -= more * p);
+            if gradient.iter().any(|g| !g.is_finite()) {
+                return Ok(None);
+            }
+        }
+        Ok(Some(Point { y, gradient, log_density: view.log_density - origin }))
+    }
+
+    /// Makes a place, or the one it began in, the state of the trace, with the choices drawn from their conditional there.
+    pub(super) fn settle_summed(mut self, summed: Summed, to: Option<&Point>) -> TraceResult<bool> {
+        let y = to.map_or(&summed.start, |p| &p.y);
+        let mut rng = self.at.within(0).stream();
+        let Some(view) = self.view(&summed.sums, y)? else {
+            self.trace.rollback();
+            return Ok(false);
+        };
+        let drawn: Vec<usize> = view.conditional.iter().map(|c| draw(c, &mut rng)).collect();
+        let there = self.put(&summed.sums, y, |i| drawn[i])?.is_some();
+        if there {
+            self.trace.commit()
+        } else {
+            self.trace.rollback()
+        }
+        Ok(there && to.is_some())
+    }
+}
+
+/// A value drawn with these log probabilities.
+fn draw(log: &[f64], rng: &mut Stream) -> usize {
+    let (mut u, mut last) = (rng.uniform(), 0);
+    for (i, p) in log.iter().map(|l| libm::exp(*l)).enumerate().filter(|(_, p)| *p > 0.0) {
+        last = i;
+        if u < p {
+            break;
+        }
+        u -= p;
+    }
+    last
+}
