@@ -65,17 +65,92 @@ impl Sums {
     }
 }
 
+/// Choices that stay although nothing may ask for them.
+#[derive(Debug)]
+pub(crate) struct Held(Vec<NodeId>);
+
 impl Trace {
+    /// Makes the choices that any value of some others asks for exist, drawn from their prior given the rest, and stay until
+    /// [`Trace::let_go`]: a component of a mixture that no label points at now.
+    ///
+    /// # Errors
+    /// As [`Trace::sums`].
+    pub(crate) fn hold_alternatives(&mut self, sites: &[Target], draws: Draws) -> TraceResult<Held> {
+        self.rollback();
+        let values = self.finite_values(sites)?;
+        let mut held = Held(Vec::new());
+        self.hold_all(&mut held);
+        let original = self.present(sites);
+        let mut found = Ok(());
+        for k in 0..values.iter().map(Vec::len).max().unwrap_or(0) {
+            let set = |(t, v): (&Target, &Vec<Datum>)| (*t, Change::Set(v[k % v.len()].clone()));
+            let all: Vec<_> = sites.iter().zip(&values).map(set).collect();
+            found = match self.propose(&all, draws) {
+                Ok(w) if w.vanished > 0 => Err(self.cannot_sum(sites[0], "other choices vanish with it")),
+                Ok(_) => Ok(()),
+                Err(e) => Err(e),
+            };
+            if found.is_err() {
+                self.rollback();
+                break;
+            }
+            self.commit();
+            self.hold_all(&mut held);
+        }
+        self.propose(&original, draws)?;
+        self.commit();
+        match found {
+            Ok(()) => Ok(held),
+            Err(e) => {
+                self.let_go(held)?;
+                Err(e)
+            }
+        }
+    }
+
+    fn hold_all(&mut self, held: &mut Held) {
+        let mut new: Vec<NodeId> = self.all_targets().iter().map(|t| t.node).collect();
+        new.sort_unstable();
+        new.dedup();
+        new.retain(|n| held.0.binary_search(n).is_err());
+        self.graph.begin();
+        new.iter().for_each(|n| self.graph.acquire(*n, *n, false));
+        self.graph.commit(&self.code);
+        held.0.extend(new);
+        held.0.sort_unstable();
+    }
+
+    /// Lets choices go that were held: those nothing asks for vanish.
+    ///
+    /// # Errors
+    /// Those of the program.
+    pub(crate) fn let_go(&mut self, held: Held) -> TraceResult<()> {
+        self.rollback();
+        let before = self.graph.begin();
+        held.0.iter().for_each(|n| self.graph.release(*n, false));
+        let settled = self.graph.settle(&self.code);
+        self.pend(before, settled)?;
+        self.commit();
+        Ok(())
+    }
+
+    /// The changes that leave choices as they are.
+    fn present(&self, sites: &[Target]) -> Vec<(Target, Change)> {
+        sites.iter().filter_map(|t| Some((*t, Change::Set(self.stored(*t)?)))).collect()
+    }
+
     /// Finds what choices reach. The trace is left as it was.
     ///
     /// # Errors
     /// If one of them is not finite, if structure depends on one, or if too many depend on each other.
     pub(crate) fn sums(&mut self, sites: &[Target]) -> TraceResult<Sums> {
         self.rollback();
-        let original: Vec<(Target, Change)> =
-            sites.iter().filter_map(|t| Some((*t, Change::Set(self.stored(*t)?)))).collect();
+        let original = self.present(sites);
+        // Running everything would seem to reach everything.
+        let incremental = std::mem::replace(&mut self.graph.incremental, true);
         let found = self.reach(sites);
         self.rollback();
+        self.graph.incremental = incremental;
         self.propose(&original, Draws::default())?;
         self.commit();
         let (values, sinks) = found?;

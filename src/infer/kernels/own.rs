@@ -166,6 +166,11 @@ impl Play<'_> {
         trace: &mut Trace,
         variables: &[(Arc<str>, Value)],
     ) -> TraceResult<Value> {
+        if self.moved.is_none() {
+            let mut e = fail(dist.span, format!("`{name}` is an auxiliary variable, which belongs to a map"));
+            e.hint = Some(format!("propose @x = value(@x) + {name}; propose {name} = -{name};"));
+            return Err(e);
+        }
         let dist = self.distribution(dist, trace, variables)?;
         let value = match &mut self.source {
             Source::Drawn(rng) => Value::from_datum(&dist.sample(rng)),

@@ -114,7 +114,9 @@ impl Lowerer<'_> {
                 self.plan_expr(dist, around);
                 match &target.kind {
                     // An auxiliary variable of a map.
-                    ExprKind::Var(name) if around.in_kernel => around.names.push(Arc::clone(name)),
+                    ExprKind::Var(name) if around.in_kernel && !self.roots.contains(name) => {
+                        around.names.push(Arc::clone(name))
+                    }
                     _ => self.selection(target, &around.names.clone()),
                 }
             }

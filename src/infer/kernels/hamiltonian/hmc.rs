@@ -1,8 +1,9 @@
 //! `hmc(sel, steps)` and `mala(sel)`: trajectories of a fixed number of leapfrog steps (Neal 2011).
 
+use super::summed::with_alternatives;
 use super::{Adaptation, DIVERGENT, System, system};
 use crate::infer::kernel::{At, Kernel, Outcome, Pick, Registered, Scope, accepts};
-use crate::trace::{Selector, Trace, TraceResult};
+use crate::trace::{Selector, Target, Trace, TraceResult};
 
 /// Hamiltonian Monte Carlo; with one step it is the Metropolis-adjusted Langevin algorithm.
 #[derive(Clone, Debug)]
@@ -40,10 +41,18 @@ impl Kernel for Hmc {
     }
 
     fn step(&mut self, trace: &mut Trace, at: &At) -> TraceResult<Outcome> {
+        let mut summed = self.summed.clone();
+        let outcome = with_alternatives(&mut summed, trace, at, |trace, sites| self.go(trace, at, sites));
+        self.summed = summed;
+        outcome
+    }
+}
+
+impl Hmc {
+    fn go(&mut self, trace: &mut Trace, at: &At, sites: &[Target]) -> TraceResult<Outcome> {
         let mut rng = at.stream();
         let (targets, _) = self.scope.members(trace, at, &mut rng);
-        let sites = self.summed.members(trace, at, &mut rng).0;
-        let Some((mut system, here)) = System::begin(trace, at, &targets, &sites)? else {
+        let Some((mut system, here)) = System::begin(trace, at, &targets, sites)? else {
             return Ok(Outcome::default());
         };
         let step = self.adaptation.step(&mut system, &here, at.adapting, &mut rng)?;

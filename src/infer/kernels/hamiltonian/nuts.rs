@@ -1,11 +1,12 @@
 //! `nuts(sel, max_depth)`: the No-U-Turn sampler (Hoffman & Gelman 2014) with multinomial sampling over the trajectory and the
 //! generalised stopping rule, checked across subtrees too (Betancourt 2017; as Stan has it).
 
+use super::summed::with_alternatives;
 use super::{Adaptation, DIVERGENT, Momentum, Point, System, system};
 use crate::infer::kernel::{At, Kernel, Outcome, Pick, Registered, Scope};
 use crate::num::log_sum_exp;
 use crate::rng::Stream;
-use crate::trace::{Selector, Trace, TraceResult};
+use crate::trace::{Selector, Target, Trace, TraceResult};
 
 /// The No-U-Turn sampler.
 #[derive(Clone, Debug)]
@@ -147,10 +148,18 @@ impl Kernel for Nuts {
     }
 
     fn step(&mut self, trace: &mut Trace, at: &At) -> TraceResult<Outcome> {
+        let mut summed = self.summed.clone();
+        let outcome = with_alternatives(&mut summed, trace, at, |trace, sites| self.go(trace, at, sites));
+        self.summed = summed;
+        outcome
+    }
+}
+
+impl Nuts {
+    fn go(&mut self, trace: &mut Trace, at: &At, sites: &[Target]) -> TraceResult<Outcome> {
         let mut rng = at.stream();
         let (targets, _) = self.scope.members(trace, at, &mut rng);
-        let sites = self.summed.members(trace, at, &mut rng).0;
-        let Some((mut system, here)) = System::begin(trace, at, &targets, &sites)? else {
+        let Some((mut system, here)) = System::begin(trace, at, &targets, sites)? else {
             return Ok(Outcome::default());
         };
         let step = self.adaptation.step(&mut system, &here, at.adapting, &mut rng)?;

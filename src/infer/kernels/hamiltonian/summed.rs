@@ -2,14 +2,15 @@
 //!
 //! A place is looked at once for each joint value of the largest group of choices (see [`Sums`]), all groups at a value of
 //! theirs at a time. The force is the mean, over the conditional of the choices, of that of the log joint. Drawing the choices
-//! from that conditional at the end leaves the joint density of both invariant.
+//! from that conditional at the end leaves the joint density of both invariant. Choices that only other values ask for (a component
+//! of a mixture that no label points at) are drawn from their prior for the time of the move, and forgotten after it.
 
 use super::{Point, System};
-use crate::infer::kernel::recoverable;
+use crate::infer::kernel::{At, Outcome, Registered, recoverable};
 use crate::infer::selection::fail;
 use crate::num::log_sum_exp;
 use crate::rng::Stream;
-use crate::trace::{Change, Sums, Target, TraceResult, Weight};
+use crate::trace::{Change, Sums, Target, Trace, TraceResult, Weight};
 use std::sync::Arc;
 
 /// What a system sums out.
@@ -26,6 +27,23 @@ struct View {
     log_density: f64,
     /// By group and joint value: the log probability given the place.
     conditional: Vec<Vec<f64>>,
+}
+
+/// Makes a step with all choices there that the values of what is summed out ask for, and gives it what that is.
+pub(super) fn with_alternatives(
+    summed: &mut Registered,
+    trace: &mut Trace,
+    at: &At,
+    step: impl FnOnce(&mut Trace, &[Target]) -> TraceResult<Outcome>,
+) -> TraceResult<Outcome> {
+    let sites = summed.members(trace, at, &mut at.stream()).0;
+    if sites.is_empty() {
+        return step(trace, &sites);
+    }
+    let held = trace.hold_alternatives(&sites, at.within(1).draws(0))?;
+    let outcome = step(trace, &sites);
+    trace.let_go(held)?;
+    outcome
 }
 
 impl System<'_> {
