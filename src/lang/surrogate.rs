@@ -2,6 +2,7 @@
 //! moves in first.
 
 use super::code::{Code, DistSpec, Op, Operand};
+use super::slots::SlotFacts;
 
 impl Code {
     /// The same program with the surrogates of these observations, given as indices of operations, in their place.
@@ -21,8 +22,11 @@ impl Code {
                 }
             }
         }
-        // Where changes spread to was found for the program as it was.
-        code.slots.iter_mut().for_each(|s| s.spread = None);
+        // How changes spread was found for the program as it was.
+        for facts in &mut code.slots {
+            let SlotFacts { slot, is_effect, is_draw, is_result, reads, users, .. } = std::mem::take(facts);
+            *facts = SlotFacts { slot, is_effect, is_draw, is_result, reads, users, ..SlotFacts::default() };
+        }
         code
     }
 }

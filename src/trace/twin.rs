@@ -58,11 +58,6 @@ impl Trace {
         });
         found
     }
-
-    /// Another number as soon as anything has been proposed.
-    pub(crate) fn revision(&self) -> u32 {
-        self.graph.epoch
-    }
 }
 
 /// Goes through the choices of two traces side by side, by the hashes of their addresses.

@@ -10,7 +10,6 @@ use crate::infer::kernel::{At, Kernel, Outcome, decide, recoverable};
 use crate::infer::selection::fail;
 use crate::syntax::span::Span;
 use crate::trace::{Selector, Trace, TraceResult};
-use std::sync::Arc;
 
 /// Two-stage acceptance around a reversible kernel.
 pub struct Delayed {
@@ -18,14 +17,8 @@ pub struct Delayed {
     /// The observations whose surrogates decide first.
     observations: Selector,
     span: Span,
-    twin: Option<Twin>,
-}
-
-/// The trace under the surrogates, and the state of the chain's trace that it has.
-struct Twin {
-    trace: Trace,
-    of: Arc<()>,
-    revision: u32,
+    /// The trace under the surrogates.
+    twin: Option<Trace>,
 }
 
 impl Delayed {
@@ -35,18 +28,14 @@ impl Delayed {
     }
 
     /// Brings the twin to the present state.
-    fn follow(&mut self, trace: &mut Trace) -> TraceResult<&mut Twin> {
+    fn follow(&mut self, trace: &mut Trace) -> TraceResult<&mut Trace> {
         trace.rollback();
-        let (of, revision) = (Arc::clone(trace.identity()), trace.revision());
         let twin = match self.twin.take() {
-            Some(twin) if Arc::ptr_eq(&twin.of, &of) && twin.revision == revision => {
-                return Ok(self.twin.insert(twin));
-            }
             Some(mut twin) => {
-                twin.trace.observe_as(trace)?;
-                twin.trace.propose_choices_of(trace)?;
-                twin.trace.commit();
-                twin.trace
+                twin.observe_as(trace)?;
+                twin.propose_choices_of(trace)?;
+                twin.commit();
+                twin
             }
             None => match trace.under_surrogates(&self.observations)? {
                 Some(twin) => twin,
@@ -61,7 +50,7 @@ impl Delayed {
             let address = twin.address(extra);
             return Err(fail(self.span, format!("delayed: only the surrogate asks for the choice {address}")));
         }
-        Ok(self.twin.insert(Twin { trace: twin, of, revision }))
+        Ok(self.twin.insert(twin))
     }
 }
 
@@ -79,36 +68,35 @@ impl Kernel for Delayed {
     fn sweep(&mut self, trace: &mut Trace) -> Option<usize> {
         // What goes wrong shows in the step.
         self.follow(trace).ok()?;
-        self.kernel.sweep(&mut self.twin.as_mut()?.trace)
+        self.kernel.sweep(self.twin.as_mut()?)
     }
 
     fn step(&mut self, trace: &mut Trace, at: &At) -> TraceResult<Outcome> {
         self.follow(trace)?;
         let Some(twin) = &mut self.twin else { return Ok(Outcome::default()) };
-        let before = tempered(&twin.trace, at.power);
-        let more = trace.choice_count() - twin.trace.choice_count();
-        let inner = self.kernel.step(&mut twin.trace, &At { member: at.member, ..at.within(0) })?;
-        twin.trace.rollback();
+        let before = tempered(twin, at.power);
+        let more = trace.choice_count() - twin.choice_count();
+        let inner = self.kernel.step(twin, &At { member: at.member, ..at.within(0) })?;
+        twin.rollback();
         if inner.accepted == 0 {
             return Ok(Outcome { site: None, ..inner });
         }
-        let coarse = tempered(&twin.trace, at.power) - before;
-        let mut outcome = match recoverable(trace.propose_choices_of(&twin.trace))? {
+        let coarse = tempered(twin, at.power) - before;
+        let mut outcome = match recoverable(trace.propose_choices_of(twin))? {
             None => Outcome { accepted: 0, failed: 1, ..inner },
             Some(w) => {
-                let fine = w.log_joint - (1.0 - at.power) * w.log_likelihood;
+                let fine =
+                    if at.power == 1.0 { w.log_joint } else { w.log_joint - (1.0 - at.power) * w.log_likelihood };
                 // Choices that only the observation asks for stay as they are.
-                let same =
-                    trace.lacks(&twin.trace).is_none() && trace.choice_count() - twin.trace.choice_count() == more;
+                let same = trace.lacks(twin).is_none() && trace.choice_count() - twin.choice_count() == more;
                 let decided = decide(trace, if same { fine - coarse } else { f64::NEG_INFINITY }, &mut at.stream());
                 Outcome { accepted: decided.accepted.min(inner.accepted), ..inner }
             }
         };
         if outcome.accepted == 0 {
-            twin.trace.propose_choices_of(trace)?;
-            twin.trace.commit();
+            twin.propose_choices_of(trace)?;
+            twin.commit();
         }
-        twin.revision = trace.revision();
         outcome.site = None;
         Ok(outcome)
     }
