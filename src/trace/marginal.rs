@@ -4,7 +4,7 @@
 //! values are enumerated. The log joint is then a base plus one term for each group, so that the log of its sum over all
 //! joint values of all choices is the base plus, for each group, a log-sum-exp over the values of that group alone. What a choice
 //! reaches is found by proposing its values, each time with all choices at a value of theirs, so a dependence that only
-//! one branch has is found too. Not here: what the sums are for ([`crate::infer`]).
+//! one branch has is found too. Not here: what the sums are for.
 
 use super::node::*;
 use super::{Change, Draws, Target, Trace, TraceResult};
