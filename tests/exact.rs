@@ -47,13 +47,13 @@ fn labels_are_summed_out() {
             let text = format!(
                 "let y = {y:?}; assume m ~ normal(1, 2);
                  for i in 0 .. 3 {{ z[i] ~ flip({prior}); observe normal(if z[i] {{ m }} else {{ 0 }}, 0.7) = y[i]; }}
-                 infer {{ warmup 500 {{ {k} }} repeat 15000 {{ {k} collect m, z; }} }}"
+                 infer {{ warmup 500 {{ {k} }} repeat 6000 {{ {k} collect m, z; }} }}"
             );
             let d = run(&text, 1, 2);
-            assert_mean(&format!("{kernel}: m"), &d["m"], sum(&|_, m| m) / total, 0.2);
+            assert_mean(&format!("{kernel}: m"), &d["m"], sum(&|_, m| m) / total, 0.4);
             for i in 0..3 {
                 let expected = sum(&|z, _| z[i] as f64) / total;
-                assert_mean(&format!("{kernel}: z[{i}]"), &d[&format!("z[{i}]")], expected, 0.06);
+                assert_mean(&format!("{kernel}: z[{i}]"), &d[&format!("z[{i}]")], expected, 0.1);
             }
         }
     }

@@ -26,6 +26,9 @@ pub(crate) struct Sums {
     passes: usize,
 }
 
+/// The values of each of some choices, and the scores it reaches.
+type Reached = (Vec<Vec<Datum>>, Vec<Vec<NodeId>>);
+
 /// Choices that reach scores in common.
 #[derive(Clone, Debug, Default)]
 struct Group {
@@ -158,7 +161,7 @@ impl Trace {
     }
 
     /// The values of each choice, and the scores it reaches.
-    fn reach(&mut self, sites: &[Target]) -> TraceResult<(Vec<Vec<Datum>>, Vec<Vec<NodeId>>)> {
+    fn reach(&mut self, sites: &[Target]) -> TraceResult<Reached> {
         let values = self.finite_values(sites)?;
         let mut sinks = vec![Vec::new(); sites.len()];
         for k in 0..values.iter().map(Vec::len).max().unwrap_or(0) {
