@@ -190,7 +190,7 @@ impl<'a> Generator<'a> {
 
     fn plan(&mut self) -> Vec<KStmt> {
         self.many(0, |g| {
-            let kind = match g.pick(11) {
+            let kind = match g.pick(12) {
                 0 => KStmtKind::Expr(g.expr()),
                 1 => KStmtKind::Warmup { count: g.expr(), body: g.plan() },
                 2 => KStmtKind::Repeat { count: g.expr(), body: g.plan() },
