@@ -66,6 +66,16 @@ const STRUCTURE: Case = Case {
     },
 };
 
+/// The same with a surrogate that says something else.
+const SURROGATE: Case = Case {
+    name: "surrogate",
+    text: "assume c ~ flip(0.4);
+           assume x = if c { a ~ categorical([1, 2, 1]); a }
+                      else { b ~ gamma(2, 1); d ~ flip(0.3); if d { b } else { b + 1 } };
+           observe normal(x, 1) = 2 with coarse = normal(x - 0.7, 1.5) as y;",
+    ..STRUCTURE
+};
+
 /// The text of a model in which x is beta or gamma as c has it, and the masses of c and where x is.
 const BETA_OR_GAMMA: fn() -> Vec<f64> = || {
     let beta = |x: f64| if x > 0.0 && x < 1.0 { 12.0 * x * (1.0 - x) * (1.0 - x) } else { 0.0 };
@@ -161,6 +171,66 @@ const GAUSSIAN: Case = Case {
         };
         let row = |a0, a1| [(-8.0, 0.0), (0.0, 1.0), (1.0, 9.0)].map(|(b0, b1)| cell(a0, a1, b0, b1));
         normalised([row(-5.0, -0.5), row(-0.5, 0.5), row(0.5, 1.2), row(1.2, 6.0)].concat())
+    },
+};
+
+/// Two positive numbers, moved by maps: changed over, one scaled, their sum split anew.
+const MAPS: Case = Case {
+    name: "maps",
+    text: "assume x ~ gamma(2, 1); assume y ~ gamma(3, 1); observe normal(x - 2 * y, 1) = -1;
+           kernel swap() { propose @x = value(@y); propose @y = value(@x); }
+           kernel scaled() { propose u ~ lognormal(0, 0.7); propose @x = value(@x) * u; propose u = 1 / u; }
+           kernel split() {
+             propose u ~ beta(2, 3);
+             let all = value(@x) + value(@y);
+             propose @x = all * u; propose @y = all * (1 - u); propose u = value(@x) / all;
+           }",
+    collect: "x, y",
+    cell: |d, i| bin(d["x"][i], &[1.0, 2.0]) * 3 + bin(d["y"][i], &[1.0, 1.8]),
+    mass: || {
+        let cell = |x0: f64, x1: f64, y0: f64, y1: f64| {
+            let inner = |x: f64| {
+                integrate(|y| y * y * (-y).exp() * normal_pdf(-1.0, x - 2.0 * y, 1.0), y0, y1, 400) * x * (-x).exp()
+            };
+            integrate(inner, x0, x1, 400)
+        };
+        let row = |x0, x1| [(0.0, 1.0), (1.0, 1.8), (1.8, 16.0)].map(|(y0, y1)| cell(x0, x1, y0, y1));
+        normalised([row(0.0, 1.0), row(1.0, 2.0), row(2.0, 20.0)].concat())
+    },
+};
+
+/// Two labels that share an observation, one with a prior that depends on a number, and a number whose prior has a label in it.
+const MIXTURE: Case = Case {
+    name: "mixture",
+    text: "assume s ~ gamma(2, 1); assume a ~ flip(0.3); assume b ~ categorical([0.2, 0.5, 0.3]);
+           assume m ~ normal(if a { 1 } else { -1 }, s);
+           observe normal(m + b, 0.7) = 1.5; observe flip(s / (s + 1)) = true;",
+    collect: "s, a, b, m",
+    cell: |d, i| {
+        (bin(d["s"][i], &[1.5]) * 2 + d["a"][i] as usize) * 6 + d["b"][i] as usize * 2 + bin(d["m"][i], &[0.5])
+    },
+    mass: || {
+        let cell = |s0: f64, s1: f64, a: usize, b: usize, m0: f64, m1: f64| {
+            let centre = if a == 1 { 1.0 } else { -1.0 };
+            let inner = |s: f64| {
+                let s = s.max(1e-9);
+                let m = |m: f64| normal_pdf(m, centre, s) * normal_pdf(1.5, m + b as f64, 0.7);
+                // Nothing is left six deviations from what is observed.
+                let (near, far) = (m0.max(1.5 - b as f64 - 4.2), m1.min(1.5 - b as f64 + 4.2));
+                let narrow = (near.max(centre - 8.0 * s), far.min(centre + 8.0 * s));
+                let (low, high) = (narrow.0, narrow.1.max(narrow.0));
+                s * (-s).exp() * s / (s + 1.0) * integrate(m, low, high, 200)
+            };
+            [0.7, 0.3][a] * [0.2, 0.5, 0.3][b] * integrate(inner, s0, s1, 600)
+        };
+        let mut w = Vec::new();
+        for (s0, s1) in [(0.0, 1.5), (1.5, 16.0)] {
+            for (a, b) in [(0, 0), (0, 1), (0, 2), (1, 0), (1, 1), (1, 2)] {
+                w.push(cell(s0, s1, a, b, -40.0, 0.5));
+                w.push(cell(s0, s1, a, b, 0.5, 40.0));
+            }
+        }
+        normalised(w)
     },
 };
 
@@ -274,6 +344,11 @@ fn choices_that_appear_and_vanish() {
 }
 
 #[test]
+fn surrogates_that_decide_first() {
+    all_balanced(&SURROGATE, 20_000, kernels::balance::SURROGATE);
+}
+
+#[test]
 fn one_name_in_two_branches() {
     all_balanced(&SAME_NAME, 20_000, kernels::balance::SAME_NAME);
 }
@@ -298,6 +373,16 @@ fn a_support_that_moves_with_a_branch() {
 #[test]
 fn values_that_depend_on_another_choice() {
     all_balanced(&FINITE_SUPPORT, 20_000, kernels::balance::FINITE_SUPPORT);
+}
+
+#[test]
+fn maps_that_are_their_own_inverse() {
+    all_balanced(&MAPS, 20_000, kernels::balance::MAPS);
+}
+
+#[test]
+fn labels_that_are_summed_out() {
+    all_balanced(&MIXTURE, 20_000, kernels::balance::MIXTURE);
 }
 
 #[test]

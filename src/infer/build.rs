@@ -2,10 +2,12 @@
 
 use super::expr::{Scope, evaluate};
 use super::kernel::Kernel;
-use super::kernels::{Abc, Block, Drift, Elliptical, Gibbs, Hmc, Knn, Mh, Nuts, Optimize, Own, Slice, Smc, Temper};
+use super::kernels::{
+    Abc, AbcSmc, Block, Delayed, Drift, Elliptical, Gibbs, Hmc, Knn, Mh, Nuts, Optimize, Own, Slice, Smc, Temper,
+};
 use super::plan::banks::neighbours;
 use super::plan::{RunOptions, argument, call};
-use super::selection::{fail, scope};
+use super::selection::{fail, scope, selector};
 use crate::lang::error::RunError;
 use crate::lang::value::Value;
 use crate::syntax::ast::{Address, Arg, Expr, ExprKind, KernelDecl, Key, Param};
@@ -66,29 +68,51 @@ pub(super) fn build(
         let kernel = Smc::new(inner.kernel, particles as usize, frozen.clone(), e.span);
         return Ok(Built { kernel: Box::new(kernel), signature });
     }
+    if name == "delayed" {
+        let inner = build(&first.value, frozen, options, env)?;
+        let at = argument(args, 1, "at").ok_or_else(|| fail(e.span, "delayed needs an observation, `at`".into()))?;
+        let observations = selector(at, env)?;
+        let signature = format!("delayed({}, {observations:?})", inner.signature);
+        let kernel = Delayed::new(inner.kernel, observations, e.span);
+        return Ok(Built { kernel: Box::new(kernel), signature });
+    }
     if name == "abc" {
         let inner = build(&first.value, frozen, options, env)?;
         let eps = positive(argument(args, 1, "eps"), name, "eps", env)?;
         let eps = eps.ok_or_else(|| fail(e.span, "abc needs the largest distance that is accepted, `eps`".into()))?;
-        let signature = format!("abc({}, {eps})", inner.signature);
-        return Ok(Built { kernel: Box::new(Abc::new(inner.kernel, eps, e.span)), signature });
+        let Some(particles) = argument(args, 2, "particles") else {
+            let signature = format!("abc({}, {eps})", inner.signature);
+            return Ok(Built { kernel: Box::new(Abc::new(inner.kernel, eps, e.span)), signature });
+        };
+        let particles = whole(Some(particles), "particles", 100, 2, 1_000_000, env)?;
+        let moves = whole(argument(args, 3, "moves"), "moves", 1, 1, 10_000, env)?;
+        let signature = format!("abc({}, {eps}, {particles}, {moves})", inner.signature);
+        let kernel = AbcSmc::new(inner.kernel, eps, (particles as usize, moves), frozen.clone(), e.span);
+        return Ok(Built { kernel: Box::new(kernel), signature });
     }
     let mut scope = scope(&first.value, env)?;
-    if *frozen != Selector::Nothing {
-        scope.selector = Selector::Minus(Box::new(scope.selector), Box::new(frozen.clone()));
-    }
+    scope.selector = without(scope.selector, frozen);
     let signature = format!("{} {scope:?}", print_expr(e));
     let kernel: Box<dyn Kernel> = match name {
         "mh" => Box::new(Mh::new(scope)),
         "block" => Box::new(Block::new(scope)),
         "gibbs" => Box::new(Gibbs::new(scope)),
         "elliptical" => Box::new(Elliptical::new(scope)),
-        "hmc" => Box::new(Hmc::new(scope, whole(argument(args, 1, "steps"), "steps", 10, 1, 10_000, env)?, None)),
-        "mala" => Box::new(Hmc::new(scope, 1, None)),
-        "nuts" => Box::new(Nuts::new(scope, whole(argument(args, 1, "max_depth"), "max_depth", 10, 1, 20, env)?)),
+        "hmc" => {
+            let steps = whole(argument(args, 1, "steps"), "steps", 10, 1, 10_000, env)?;
+            Box::new(Hmc::new(scope, steps, None).summing_out(marginal(args, 2, frozen, env)?))
+        }
+        "mala" => Box::new(Hmc::new(scope, 1, None).summing_out(marginal(args, 1, frozen, env)?)),
+        "nuts" => {
+            let depth = whole(argument(args, 1, "max_depth"), "max_depth", 10, 1, 20, env)?;
+            Box::new(Nuts::new(scope, depth).summing_out(marginal(args, 2, frozen, env)?))
+        }
         "knn" => Box::new(Knn::new(scope, neighbours(e, args, options, env)?)),
         "drift" => Box::new(Drift::new(scope, positive(argument(args, 1, "scale"), name, "scale", env)?)),
-        "slice" => Box::new(Slice::new(scope, positive(argument(args, 1, "width"), name, "width", env)?)),
+        "slice" => {
+            let width = positive(argument(args, 1, "width"), name, "width", env)?;
+            Box::new(Slice::new(scope, width, truth(argument(args, 2, "doubling"), "doubling", env)?))
+        }
         "optimize" => {
             Box::new(Optimize::new(scope, whole(argument(args, 1, "steps"), "steps", 100, 1, 1_000_000, env)?))
         }
@@ -97,7 +121,21 @@ pub(super) fn build(
     Ok(Built { kernel, signature })
 }
 
-const AVAILABLE: &str = "mh, block, drift, gibbs, elliptical, hmc, mala, nuts, slice, knn, temper, smc, abc, optimize";
+const AVAILABLE: &str =
+    "mh, block, drift, gibbs, elliptical, hmc, mala, nuts, slice, knn, delayed, temper, smc, abc, optimize";
+
+fn without(selector: Selector, frozen: &Selector) -> Selector {
+    match frozen {
+        Selector::Nothing => selector,
+        _ => Selector::Minus(Box::new(selector), Box::new(frozen.clone())),
+    }
+}
+
+/// The finite choices that a kernel sums out.
+fn marginal(args: &[Arg], place: usize, frozen: &Selector, env: &mut Scope) -> Result<Selector, Box<RunError>> {
+    let Some(e) = argument(args, place, "marginal") else { return Ok(Selector::Nothing) };
+    Ok(without(selector(e, env)?, frozen))
+}
 
 /// The values of the parameters of a declared kernel, by name.
 ///
@@ -123,6 +161,15 @@ fn positive(e: Option<&Expr>, kernel: &str, name: &str, env: &mut Scope) -> Resu
     match evaluate(e, env)? {
         Value::Num(s) if s > 0.0 => Ok(Some(s)),
         v => Err(fail(e.span, format!("{kernel}: `{name}` must be positive, got {v}"))),
+    }
+}
+
+/// A switch that a kernel takes besides its selection; off unless given.
+fn truth(e: Option<&Expr>, name: &str, env: &mut Scope) -> Result<bool, Box<RunError>> {
+    let Some(e) = e else { return Ok(false) };
+    match evaluate(e, env)? {
+        Value::Bool(b) => Ok(b),
+        v => Err(fail(e.span, format!("`{name}` is true or false, got {v}"))),
     }
 }
 

@@ -3,12 +3,12 @@
 
 use super::selection::fail;
 use crate::lang::builtins::{Args, Kind};
-use crate::lang::code::Code;
+use crate::lang::code::{Code, Operand};
 use crate::lang::error::RunError;
 use crate::lang::index::index_value;
 use crate::lang::value::Value;
 use crate::syntax::ast::{BinaryOp, Expr, ExprKind, UnaryOp};
-use crate::trace::{Draws, Trace};
+use crate::trace::{Address, Draws, Trace};
 use std::sync::Arc;
 use std::time::Instant;
 
@@ -21,6 +21,8 @@ pub(crate) struct Scope<'a> {
     pub draws: Draws,
     pub started: Instant,
     pub steps: u64,
+    /// In a map of a kernel, which reads nothing else of the state: choices with values in place of those they have.
+    pub moved: Option<&'a [(Address, Value)]>,
 }
 
 /// Evaluates an expression.
@@ -79,9 +81,13 @@ pub(crate) fn evaluate(e: &Expr, env: &mut Scope) -> Result<Value, Box<RunError>
                 "value" => {
                     let [arg] = &args[..] else { return Err(unsupported(e)) };
                     let at = super::selection::address(&arg.value, env)?;
+                    if let Some((_, v)) = env.moved.and_then(|moved| moved.iter().find(|(a, _)| *a == at)) {
+                        return Ok(v.clone());
+                    }
                     let found = env.trace.find(&at).map(|t| env.trace.value(t));
                     return found.ok_or_else(|| fail(arg.value.span, format!("there is no choice {at} in this state")));
                 }
+                "log_joint" | "log_prior" | "log_likelihood" if env.moved.is_some() => return Err(unmapped(e)),
                 "log_joint" => return Ok(Value::Num(env.trace.log_joint())),
                 "log_prior" => return Ok(Value::Num(env.trace.log_prior())),
                 "log_likelihood" => return Ok(Value::Num(env.trace.log_likelihood())),
@@ -98,6 +104,9 @@ pub(crate) fn evaluate(e: &Expr, env: &mut Scope) -> Result<Value, Box<RunError>
 fn variable(name: &Arc<str>, e: &Expr, env: &mut Scope) -> Result<Value, Box<RunError>> {
     if let Some((_, v)) = env.variables.iter().rev().find(|(n, _)| n == name) {
         return Ok(v.clone());
+    }
+    if env.moved.is_some() && env.code.globals.get(name).is_some_and(|o| !matches!(o, Operand::Const(_))) {
+        return Err(unmapped(e));
     }
     match env.trace.global(name, env.draws) {
         Some(v) => v,
@@ -126,6 +135,12 @@ fn builtin(name: &str, values: &[&Value], e: &Expr, env: &Scope) -> Result<Value
         },
         None => Err(fail(e.span, format!("`{name}` is not known here"))),
     }
+}
+
+fn unmapped(e: &Expr) -> Box<RunError> {
+    let mut error = fail(e.span, "a map reads choices and constants alone, so that its derivatives are known".into());
+    error.hint = Some("write it with value(@x) of the choices it is made of".into());
+    error
 }
 
 fn unsupported(e: &Expr) -> Box<RunError> {

@@ -132,7 +132,7 @@ pub(crate) fn start_of(code: &Arc<Code>, plan: &[KStmt], options: &RunOptions) -
     let mut trace = Trace::prior(Arc::clone(code), options.limits);
     let mut count = |e: &Expr| -> Result<u64, ChainError> {
         let (draws, started) = (Draws::default(), Instant::now());
-        let mut env = Scope { code, trace: &mut trace, variables: &[], draws, started, steps: 0 };
+        let mut env = Scope { code, trace: &mut trace, variables: &[], draws, started, steps: 0, moved: None };
         match evaluate(e, &mut env)? {
             Value::Num(x) if x >= 1.0 => Ok(x as u64),
             v => Err(ChainError::Run(fail(e.span, format!("a number of draws was expected, got {v}")))),

@@ -180,6 +180,11 @@ impl Registered {
         Registered { scope, selection: None, sweep: None }
     }
 
+    /// No choices.
+    pub fn nothing() -> Self {
+        Registered::new(Scope { selector: Selector::Nothing, pick: Pick::All })
+    }
+
     /// The selection in this kernel's trace.
     pub fn selection(&mut self, trace: &mut Trace) -> Selection {
         match &self.selection {

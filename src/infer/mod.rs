@@ -26,7 +26,9 @@ pub use default_plan::default_plan;
 pub(crate) use init::attempts;
 pub use init::{Start, StartError, starts};
 pub use kernel::{At, Kernel, Outcome, Pick, Scope};
-pub use kernels::{Abc, Block, Drift, Elliptical, Gibbs, Hmc, Knn, Mh, Nuts, Optimize, Slice, Smc, Temper};
+pub use kernels::{
+    Abc, AbcSmc, Block, Delayed, Drift, Elliptical, Gibbs, Hmc, Knn, Mh, Nuts, Optimize, Slice, Smc, Temper,
+};
 pub use neighbours::{Banks, Latent, Latents, Neighbours};
 pub(crate) use parallel::in_parallel;
 pub use plan::{ChainError, ChainResult, Progress, RunOptions, Watch};

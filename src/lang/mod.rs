@@ -16,5 +16,6 @@ pub mod load;
 pub mod lower;
 mod slots;
 mod spread;
+mod surrogate;
 pub mod tape;
 pub mod value;

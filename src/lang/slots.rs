@@ -126,7 +126,7 @@ impl Code {
 
 impl Op {
     /// Where its operands are, if those it always reads are all it holds.
-    fn reads(&self) -> Option<Box<[(u16, Slot)]>> {
+    pub(super) fn reads(&self) -> Option<Box<[(u16, Slot)]>> {
         if matches!(self, Op::Param { .. } | Op::Call { .. } | Op::Select { .. } | Op::Fold { .. } | Op::Gather) {
             return None;
         }

@@ -460,12 +460,19 @@ pub enum KStmtKind {
     StopWhen(Expr),
     /// `collect e, …;`
     Collect(Vec<Expr>),
-    /// `propose @x ~ d;`, in kernels only.
+    /// `propose @x ~ d;`, in kernels only; `propose u ~ d;` draws an auxiliary variable.
     Propose {
-        /// The address of one choice.
+        /// The address of one choice, or a new name.
         target: Expr,
         /// The proposal distribution.
         dist: Expr,
+    },
+    /// `propose @x = e;`, in kernels only: what a choice or auxiliary variable becomes.
+    Map {
+        /// The address of one choice, or the name of an auxiliary variable.
+        target: Expr,
+        /// The new value.
+        value: Expr,
     },
     /// `let x = e;`
     Let {

@@ -345,6 +345,7 @@ impl Printer {
                 self.list(exprs, Self::expr);
             }
             KStmtKind::Propose { target, dist } => self.pair("propose ", target, " ~ ", dist),
+            KStmtKind::Map { target, value } => self.pair("propose ", target, " = ", value),
             KStmtKind::Let { name, expr } => {
                 self.text("let ");
                 self.binding(name, Bind::Value, expr);

@@ -87,6 +87,11 @@ impl Graph {
         Before { prior: self.prior.clone(), likelihood: self.likelihood.clone() }
     }
 
+    /// The nodes that the current update may have changed.
+    pub fn journaled(&self) -> impl Iterator<Item = NodeId> {
+        self.journal.iter().filter_map(|e| if let Entry::Node { id, .. } = e { Some(*id) } else { None })
+    }
+
     /// Saves a node's plain fields, once an update.
     pub fn save(&mut self, n: NodeId) {
         let node = &mut self.nodes[n as usize];

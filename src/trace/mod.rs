@@ -11,6 +11,7 @@ mod formula;
 mod gradient;
 mod graph;
 mod journal;
+mod marginal;
 mod mark;
 mod node;
 mod observed;
@@ -22,6 +23,7 @@ mod query;
 mod save;
 mod select;
 mod spread;
+mod twin;
 
 pub use crate::lang::address::{Address, AddressSegment, AddressTextError};
 pub use choices::{Selection, Target};
@@ -39,6 +41,7 @@ use crate::lang::value::{Likelihood, Located, Value};
 pub use gradient::Recording;
 use graph::Graph;
 use journal::Before;
+pub(crate) use marginal::Sums;
 use node::{NONE, State};
 use peek::Obstacle;
 pub(crate) use peek::Peek;
@@ -323,10 +326,25 @@ impl Trace {
     /// # Errors
     /// An operation between a choice and the score of which no derivative is known.
     pub fn gradient(&self, targets: &[Target], power: f64, out: &mut Vec<f64>) -> TraceResult<()> {
+        self.weighted_gradient(targets, power, &|_| 1.0, out)
+    }
+
+    /// The same with the log density of each choice, observation and factor weighed; Jacobians are not.
+    ///
+    /// # Errors
+    /// As [`Trace::gradient`].
+    pub(crate) fn weighted_gradient(
+        &self,
+        targets: &[Target],
+        power: f64,
+        weight: &dyn Fn(u32) -> f64,
+        out: &mut Vec<f64>,
+    ) -> TraceResult<()> {
         let mut scored: Vec<u32> = self.all_targets().iter().map(|t| t.node).collect();
         scored.dedup();
         scored.extend(self.scored_nodes());
-        self.graph.gradient(&self.code, targets, &scored, power, out)
+        scored.retain(|n| weight(*n) != 0.0);
+        self.graph.gradient(&self.code, targets, &scored, (power, weight), out)
     }
 
     /// Registers a selection; its members are kept up to date from then on.
@@ -479,14 +497,16 @@ impl Trace {
     }
 
     fn scored(&self) -> Vec<(u32, f64)> {
-        let score = |i: u32| {
-            let n = &self.graph.nodes[i as usize];
-            match n.side.as_deref() {
-                Some(node::Side::Total(t)) if n.score == 0.0 => t.sum.value(),
-                _ => n.score,
-            }
-        };
-        self.scored_nodes().map(|n| (n, score(n))).collect()
+        self.scored_nodes().map(|n| (n, self.score_at(n))).collect()
+    }
+
+    /// The log density of an observation or factor.
+    fn score_at(&self, n: u32) -> f64 {
+        let n = &self.graph.nodes[n as usize];
+        match n.side.as_deref() {
+            Some(node::Side::Total(t)) if n.score == 0.0 => t.sum.value(),
+            _ => n.score,
+        }
     }
 
     /// The likelihoods that are not distributions, and what is observed under each.

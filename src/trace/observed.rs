@@ -11,7 +11,7 @@ use super::journal::Entry;
 use super::node::*;
 use super::{Address, Draws, Trace, TraceResult, Weight};
 use crate::dist::Dist;
-use crate::lang::code::{Code, DistSpec, Op, Operand};
+use crate::lang::code::{Code, DistSpec, Observed, Op, Operand};
 use crate::lang::error::Fault;
 use crate::lang::value::Value;
 use crate::rng::Stream;
@@ -112,6 +112,27 @@ impl Trace {
                 self.graph.mark_target(&self.code, *n);
             }
         }
+    }
+
+    /// What is observed in place of the program's values: another allocation as soon as it changes, for whoever holds it.
+    pub(crate) fn replacements(&self) -> &Arc<Observed> {
+        &self.graph.observed
+    }
+
+    /// Observes what another trace of the same program observes.
+    ///
+    /// # Errors
+    /// As [`Trace::set_observed`].
+    pub(crate) fn observe_as(&mut self, other: &Trace) -> TraceResult<()> {
+        if Arc::ptr_eq(&self.graph.observed, &other.graph.observed) {
+            return Ok(());
+        }
+        let mut values: Vec<_> = other.graph.observed.iter().map(|(hash, v)| (*hash, v.clone())).collect();
+        values.sort_by_key(|(hash, _)| *hash);
+        self.set_observed(&values)?;
+        self.commit();
+        self.graph.observed = Arc::clone(&other.graph.observed);
+        Ok(())
     }
 }
 

@@ -114,6 +114,18 @@ fn matches(pattern: &[PatternSegment], address: &[AddressSegment]) -> bool {
 }
 
 impl Selector {
+    /// Whether it selects by address alone what has this address; kinds and tags select nothing.
+    pub(crate) fn names(&self, address: &Address) -> bool {
+        match self {
+            Selector::All => true,
+            Selector::Address(p) => p.matches(address),
+            Selector::Union(a, b) => a.names(address) || b.names(address),
+            Selector::Both(a, b) => a.names(address) && b.names(address),
+            Selector::Minus(a, b) => a.names(address) && !b.names(address),
+            _ => false,
+        }
+    }
+
     /// Whether deciding needs the address.
     pub(crate) fn needs_address(&self) -> bool {
         match self {

@@ -21,14 +21,42 @@ pub mod exact {
         "nuts(@x)",
         "slice(@x)",
         "slice(@x, width = 0.3)",
+        "slice(@x, doubling = true)",
+        "slice(@x, width = 0.05, doubling = true)",
         "temper(drift(@x), levels = 3)",
         "smc(drift(@x, scale = 1), particles = 8)",
         "mix { 0.3 => mh(@x); 0.3 => drift(@x); 0.4 => elliptical(@x); }",
     ];
+    /// By the whole distribution: two modes of different widths.
+    pub const SLICES: &[&str] = &[
+        "slice(@x, width = 1.5)",
+        "slice(@x, width = 0.1, doubling = true)",
+        "slice(@x, width = 1.5, doubling = true)",
+        "slice(@x, width = 30, doubling = true)",
+    ];
+    /// With a surrogate that says something else.
+    pub const DELAYED: &[&str] = &[
+        "delayed(mh(@x), @y)",
+        "delayed(drift(@x), @y)",
+        "delayed(slice(@x), @y)",
+        "delayed(nuts(@x), @y)",
+        "delayed(pull(0.8), @y)",
+    ];
+    /// A mixture whose labels are summed out, and a chain of labels that depend on each other.
+    pub const SUMMED_OUT: &[&str] = &[
+        "nuts(@m, marginal = @z)",
+        "hmc(@m, steps = 5, marginal = @z)",
+        "mala(@m, marginal = @z)",
+        "nuts(@m, marginal = @z[0] + @z[1]); gibbs(one(@z));",
+    ];
     pub const BETA_BINOMIAL: &[&str] = &["mh(@p)", "drift(@p)"];
     /// Evidence and structure with particles; likelihood-free.
-    pub const SIMULATED: &[&str] =
-        &["smc(drift(@x, scale = 1), particles = 40)", "smc(mh(one(@**)), particles = 20)", "abc(mh(@p), eps = 0.5)"];
+    pub const SIMULATED: &[&str] = &[
+        "smc(drift(@x, scale = 1), particles = 40)",
+        "smc(mh(one(@**)), particles = 20)",
+        "abc(mh(@p), eps = 0.5)",
+        "abc(mh(@p), eps = 0.5, particles = 10, moves = 2)",
+    ];
     pub const DEPENDENT_SUPPORT: &[&str] = &["mh(one(@**))", "block(@**)", "drift(@**)", "drift(one(@**))"];
     pub const RECURSION: &[&str] = &[
         "mh(one(@**))",
@@ -52,8 +80,19 @@ pub mod exact {
         "mh(one($discrete)); drift(one($continuous));",
         "gibbs(one($discrete)); mh(one($continuous)); mh(one($discrete));",
     ];
-    pub const ALL: &[&[&str]] =
-        &[CONJUGATE, BETA_BINOMIAL, SIMULATED, DEPENDENT_SUPPORT, RECURSION, BRANCHES, HIDDEN_MARKOV, OPEN_UNIVERSE];
+    pub const ALL: &[&[&str]] = &[
+        CONJUGATE,
+        SLICES,
+        DELAYED,
+        SUMMED_OUT,
+        BETA_BINOMIAL,
+        SIMULATED,
+        DEPENDENT_SUPPORT,
+        RECURSION,
+        BRANCHES,
+        HIDDEN_MARKOV,
+        OPEN_UNIVERSE,
+    ];
 }
 
 /// Reversible, with the right marginal (`tests/balance.rs`).
@@ -81,6 +120,20 @@ pub mod balance {
         "nuts(@**)",
         "slice(one(@**))",
         with_mh!("slice(@p1, width = 2)"),
+        "slice(one(@**), width = 0.2, doubling = true)",
+    ];
+    /// With labels summed out; by themselves these move everything.
+    pub const MIXTURE: &[&str] = &[
+        "nuts($continuous, marginal = $finite)",
+        "hmc($continuous, steps = 3, marginal = $finite)",
+        "mala($continuous, marginal = $finite)",
+        with_mh!("nuts(@s, marginal = @a)"),
+    ];
+    /// Maps that are their own inverse, declared in the program.
+    pub const MAPS: &[&str] = &[
+        "mix { 0.5 => scaled(); 0.5 => split(); }",
+        with_mh!("swap()"),
+        "mix { 0.5 => split(); 0.3 => scaled(); 0.2 => swap(); }",
     ];
     pub const FINITE_SUPPORT: &[&str] = &[
         "mix { 0.5 => mh(one(@**)); 0.5 => block(@**); }",
@@ -119,6 +172,7 @@ pub mod balance {
         with_mh!("mala($continuous)"),
         with_mh!("nuts($continuous)"),
         with_mh!("slice($continuous)"),
+        with_mh!("slice($continuous, width = 0.1, doubling = true)"),
         with_mh!("block(@x/**)"),
     ];
     pub const SAME_NAME: &[&str] = &[
@@ -164,6 +218,14 @@ pub mod balance {
         "mix { 0.5 => gibbs(one($finite)); 0.5 => drift($continuous, 0.8); }",
         "mix { 0.5 => block(one($finite)); 0.5 => mh(one($continuous)); }",
     ];
+    /// With a surrogate that says something else.
+    pub const SURROGATE: &[&str] = &[
+        "delayed(mh(one(@**)), @y)",
+        "delayed(block(@**), @y)",
+        "delayed(drift(one(@**), 0.7), @y)",
+        with_mh!("delayed(gibbs(one($finite)), @y)"),
+        with_mh!("delayed(knn($continuous, bank = \"b\"), @y)"),
+    ];
     /// Proposals from neighbours that have nothing to do with the data, and few of them.
     pub const NEIGHBOURS: &[&str] = &[
         "knn(@**, bank = \"b\")",
@@ -173,10 +235,10 @@ pub mod balance {
     pub const NEIGHBOURS_OF_SOME: &[&str] =
         &[with_mh!("knn($continuous, bank = \"b\")"), with_mh!("knn(@c, bank = \"b\")")];
     /// The same choices always.
-    pub const FIXED: &[&[&str]] = &[DISCRETE, SUPPORT, FINITE_SUPPORT, COUNTS, GAUSSIAN, NEIGHBOURS];
+    pub const FIXED: &[&[&str]] = &[DISCRETE, SUPPORT, MIXTURE, MAPS, FINITE_SUPPORT, COUNTS, GAUSSIAN, NEIGHBOURS];
     /// Choices that appear, vanish, change form or are shared.
     pub const CHANGING: &[&[&str]] =
-        &[STRUCTURE, SAME_NAME, SHARED, MOVING, ELEMENTS, SHARED_GROUPS, NEIGHBOURS, NEIGHBOURS_OF_SOME];
+        &[STRUCTURE, SURROGATE, SAME_NAME, SHARED, MOVING, ELEMENTS, SHARED_GROUPS, NEIGHBOURS, NEIGHBOURS_OF_SOME];
 }
 
 /// Parameters and data by turns, data as choices (`tests/balance.rs`); `%` is the selection.

@@ -190,7 +190,7 @@ impl<'a> Generator<'a> {
 
     fn plan(&mut self) -> Vec<KStmt> {
         self.many(0, |g| {
-            let kind = match g.pick(11) {
+            let kind = match g.pick(12) {
                 0 => KStmtKind::Expr(g.expr()),
                 1 => KStmtKind::Warmup { count: g.expr(), body: g.plan() },
                 2 => KStmtKind::Repeat { count: g.expr(), body: g.plan() },
@@ -202,7 +202,8 @@ impl<'a> Generator<'a> {
                 6 => KStmtKind::StopWhen(g.expr()),
                 7 => KStmtKind::Collect(g.many(1, Self::expr)),
                 8 => KStmtKind::Propose { target: g.expr(), dist: g.expr() },
-                9 => KStmtKind::Let { name: g.name(), expr: g.expr() },
+                9 => KStmtKind::Map { target: g.expr(), value: g.expr() },
+                10 => KStmtKind::Let { name: g.name(), expr: g.expr() },
                 _ => KStmtKind::Expr(g.conditional()),
             };
             KStmt { kind, span: Span::default() }

@@ -7,9 +7,11 @@
 
 use crate::infer::kernel::{At, Kernel, Outcome};
 use crate::infer::selection::fail;
+use crate::lang::code::Observed;
 use crate::lang::value::Value;
 use crate::syntax::span::Span;
 use crate::trace::{Draws, Trace, TraceResult};
+use std::sync::Arc;
 
 /// Likelihood-free Metropolis-Hastings around a kernel that leaves the prior invariant and is reversible.
 pub struct Abc {
@@ -17,38 +19,64 @@ pub struct Abc {
     eps: f64,
     /// The distance at which the present state was accepted: above `eps` until a state comes near enough.
     distance: f64,
+    /// What it is a distance from.
+    observed: Option<Arc<Observed>>,
     span: Span,
 }
 
 impl Abc {
     /// A kernel and the largest distance. `span` is where errors point.
     pub fn new(kernel: Box<dyn Kernel>, eps: f64, span: Span) -> Self {
-        Abc { kernel, eps, distance: f64::INFINITY, span }
+        Abc { kernel, eps, distance: f64::INFINITY, observed: None, span }
     }
+}
 
-    /// How far data drawn in this state are from those observed.
-    fn simulate(&self, trace: &Trace, draws: Draws) -> TraceResult<f64> {
-        let replicate = trace.replicate(draws)?;
-        if let Some((address, what)) = replicate.silent.first() {
-            return Err(fail(self.span, format!("abc draws all that is observed, and {address} is {what}")));
-        }
-        let observed = trace.observed();
-        let (mut squares, mut count) = (0.0, 0.0);
-        for o in &observed {
-            let Some((_, drawn)) = replicate.values.iter().find(|(hash, _)| *hash == o.hash) else { continue };
-            let (mut a, mut b) = (Vec::new(), Vec::new());
-            if !numbers(&o.value, &mut a) || !numbers(drawn, &mut b) || a.len() != b.len() {
-                return Err(fail(
-                    self.span,
-                    format!("abc compares numbers, and {} is {}", o.address, o.value.type_name()),
-                ));
-            }
-            squares += a.iter().zip(&b).map(|(a, b)| (a - b) * (a - b)).sum::<f64>();
-            count += a.len() as f64;
-        }
-        let distance = (squares / f64::max(count, 1.0)).sqrt();
-        Ok(if distance.is_nan() { f64::INFINITY } else { distance })
+/// One step of the kernel inside under the prior, kept if data drawn in the new state are within `eps`; `distance` is that of
+/// the present state.
+pub(super) fn step_within(
+    kernel: &mut dyn Kernel,
+    trace: &mut Trace,
+    at: &At,
+    (distance, eps): (&mut f64, f64),
+    span: Span,
+) -> TraceResult<Outcome> {
+    if kernel.sweep(trace).is_some() {
+        return Err(fail(span, "abc takes a kernel of one step, without each(…)".into()));
     }
+    let before = trace.constraints();
+    let inner = kernel.step(trace, &At { power: 0.0, ..at.within(0) })?;
+    if inner.accepted == 0 && *distance <= eps {
+        return Ok(Outcome::one(false));
+    }
+    let new = simulate(trace, at.within(1).draws(0), span)?;
+    let near = new <= eps;
+    if near {
+        *distance = new;
+    } else {
+        trace.restore(&before, at.within(2).draws(0))?;
+    }
+    Ok(Outcome { accepted: u32::from(near), proposals: 1, ..inner })
+}
+
+/// How far data drawn in this state are from those observed.
+pub(super) fn simulate(trace: &Trace, draws: Draws, span: Span) -> TraceResult<f64> {
+    let replicate = trace.replicate(draws)?;
+    if let Some((address, what)) = replicate.silent.first() {
+        return Err(fail(span, format!("abc draws all that is observed, and {address} is {what}")));
+    }
+    let observed = trace.observed();
+    let (mut squares, mut count) = (0.0, 0.0);
+    for o in &observed {
+        let Some((_, drawn)) = replicate.values.iter().find(|(hash, _)| *hash == o.hash) else { continue };
+        let (mut a, mut b) = (Vec::new(), Vec::new());
+        if !numbers(&o.value, &mut a) || !numbers(drawn, &mut b) || a.len() != b.len() {
+            return Err(fail(span, format!("abc compares numbers, and {} is {}", o.address, o.value.type_name())));
+        }
+        squares += a.iter().zip(&b).map(|(a, b)| (a - b) * (a - b)).sum::<f64>();
+        count += a.len() as f64;
+    }
+    let distance = (squares / f64::max(count, 1.0)).sqrt();
+    Ok(if distance.is_nan() { f64::INFINITY } else { distance })
 }
 
 /// The numbers in a value; false if there is anything else in it.
@@ -69,22 +97,18 @@ impl Kernel for Abc {
     }
 
     fn step(&mut self, trace: &mut Trace, at: &At) -> TraceResult<Outcome> {
-        if self.kernel.sweep(trace).is_some() {
-            return Err(fail(self.span, "abc takes a kernel of one step, without each(…)".into()));
+        let same = self.observed.as_ref().is_some_and(|o| Arc::ptr_eq(o, trace.replacements()));
+        if !same {
+            // Other data than the distance is from.
+            trace.rollback();
+            self.distance = match self.observed {
+                Some(_) => simulate(trace, at.within(3).draws(0), self.span)?,
+                None => f64::INFINITY,
+            };
+            self.observed = Some(Arc::clone(trace.replacements()));
         }
-        let before = trace.constraints();
-        let inner = self.kernel.step(trace, &At { power: 0.0, ..at.within(0) })?;
-        if inner.accepted == 0 && self.distance <= self.eps {
-            return Ok(Outcome::one(false));
-        }
-        let distance = self.simulate(trace, at.within(1).draws(0))?;
         // Until a state is near enough, any that is nearer will do.
-        let near = distance <= self.eps.max(if self.distance > self.eps { self.distance } else { 0.0 });
-        if near {
-            self.distance = distance;
-        } else {
-            trace.restore(&before, at.within(2).draws(0))?;
-        }
-        Ok(Outcome { accepted: u32::from(near), proposals: 1, ..inner })
+        let eps = if self.distance > self.eps { self.distance } else { self.eps };
+        step_within(&mut *self.kernel, trace, at, (&mut self.distance, eps), self.span)
     }
 }

@@ -1,21 +1,27 @@
 //! The kernels, one file each.
 
 mod abc;
+mod abc_smc;
 mod block;
+mod delayed;
 mod drift;
 mod elliptical;
 mod gibbs;
 mod hamiltonian;
+mod involution;
 mod knn;
 mod mh;
 pub(crate) mod own;
+mod particles;
 mod shape;
 mod slice;
 mod smc;
 mod temper;
 
 pub use abc::Abc;
+pub use abc_smc::AbcSmc;
 pub use block::Block;
+pub use delayed::Delayed;
 pub use drift::Drift;
 pub use elliptical::Elliptical;
 pub use gibbs::Gibbs;

@@ -2,7 +2,7 @@
 //!
 //! The body is played on the present state and draws from each `propose @x ~ d` as it comes; then all choices change at
 //! once. The density of the way back is found by replay: the body is played again on the new state, with the old values as
-//! what it would have to draw. Every expression reads the state the play began in, never a value proposed in it.
+//! what it would have to draw. Bodies with maps are moves of their own: see `involution.rs`. Every expression reads the state the play began in, never a value proposed in it.
 
 use crate::dist::{Datum, Dist};
 use crate::infer::expr::{Scope, evaluate};
@@ -11,8 +11,8 @@ use crate::infer::selection::{address, fail};
 use crate::lang::code::Code;
 use crate::lang::value::Value;
 use crate::rng::{Purpose, Stream, StreamKey};
-use crate::syntax::ast::{Expr, KStmt, KStmtKind, KernelDecl};
-use crate::trace::{Change, Draws, Target, Trace, TraceResult};
+use crate::syntax::ast::{Expr, ExprKind, KStmt, KStmtKind, KernelDecl};
+use crate::trace::{Address, Change, Draws, Target, Trace, TraceResult};
 use std::sync::Arc;
 use std::time::Instant;
 
@@ -20,15 +20,44 @@ use std::time::Instant;
 #[derive(Clone, Debug)]
 pub(crate) struct Own {
     code: Arc<Code>,
-    declared: KernelDecl,
+    pub(super) declared: KernelDecl,
     arguments: Vec<(Arc<str>, Value)>,
     started: Instant,
 }
 
 /// One `propose` of a play.
-struct Proposed {
+pub(super) struct Proposed {
     target: Target,
     dist: Dist,
+}
+
+/// An auxiliary variable of a play.
+pub(super) struct Drawn {
+    name: Arc<str>,
+    pub dist: Dist,
+    pub value: Value,
+}
+
+/// What a map gives a value to.
+#[derive(Clone, PartialEq)]
+pub(super) enum Image {
+    Choice(Address, Target),
+    /// One of those drawn.
+    Auxiliary(usize),
+}
+
+/// What a play came to.
+#[derive(Default)]
+pub(super) struct Played {
+    pub all: Vec<Proposed>,
+    pub drawn: Vec<Drawn>,
+    pub images: Vec<(Image, Value)>,
+}
+
+/// Where the values of auxiliary variables come from.
+pub(super) enum Source<'a> {
+    Drawn(&'a mut Stream),
+    Given(&'a [Value]),
 }
 
 impl Own {
@@ -37,14 +66,25 @@ impl Own {
         Own { code, declared, arguments, started }
     }
 
-    /// What the body proposes in a state.
-    fn play(&self, trace: &mut Trace, at: &At) -> TraceResult<Vec<Proposed>> {
+    /// What the body proposes in a state; in a map, with values in place of those that choices have there.
+    pub(super) fn play(
+        &self,
+        trace: &mut Trace,
+        at: &At,
+        source: Source,
+        moved: Option<&[(Address, Value)]>,
+    ) -> TraceResult<Played> {
         let key = StreamKey::new(at.seed, at.chain, Purpose::PREDICT);
-        let mut play =
-            Play { own: self, draws: Draws { key, step: at.step, lane: at.part }, steps: at.step, all: Vec::new() };
+        let draws = Draws { key, step: at.step, lane: at.part };
+        let mut play = Play { own: self, draws, steps: at.step, source, moved, played: Played::default() };
         let mut variables = self.arguments.clone();
         play.body(&self.declared.body, trace, &mut variables)?;
-        Ok(play.all)
+        Ok(play.played)
+    }
+
+    /// What a body without a map proposes.
+    fn proposals(&self, trace: &mut Trace, at: &At) -> TraceResult<Vec<Proposed>> {
+        Ok(self.play(trace, at, Source::Given(&[]), None)?.all)
     }
 }
 
@@ -52,14 +92,16 @@ struct Play<'a> {
     own: &'a Own,
     draws: Draws,
     steps: u64,
-    all: Vec<Proposed>,
+    source: Source<'a>,
+    moved: Option<&'a [(Address, Value)]>,
+    played: Played,
 }
 
 impl Play<'_> {
     /// What expressions can see.
     fn env<'b>(&'b self, trace: &'b mut Trace, variables: &'b [(Arc<str>, Value)]) -> Scope<'b> {
         let (code, started) = (&self.own.code, self.own.started);
-        Scope { code, trace, variables, draws: self.draws, started, steps: self.steps }
+        Scope { code, trace, variables, draws: self.draws, started, steps: self.steps, moved: self.moved }
     }
 
     fn body(&mut self, body: &[KStmt], trace: &mut Trace, variables: &mut Vec<(Arc<str>, Value)>) -> TraceResult<()> {
@@ -79,12 +121,30 @@ impl Play<'_> {
                         done?;
                     }
                 }
+                KStmtKind::Map { target, value } => {
+                    let image = self.image(target, trace, variables)?;
+                    if self.played.images.iter().any(|(i, _)| *i == image) {
+                        return Err(fail(s.span, "this is given a new value twice in one kernel".into()));
+                    }
+                    let value = evaluate(value, &mut self.env(trace, variables))?;
+                    self.played.images.push((image, value));
+                }
                 KStmtKind::Propose { target, dist } => {
+                    if let ExprKind::Var(name) = &target.kind {
+                        let value = self.auxiliary(name, dist, trace, variables)?;
+                        variables.push((Arc::clone(name), value));
+                        continue;
+                    }
+                    if self.moved.is_some() {
+                        let mut e = fail(s.span, "a kernel with a map draws auxiliary variables only".into());
+                        e.hint = Some("propose u ~ normal(0, 1); propose @x = value(@x) + u; propose u = -u;".into());
+                        return Err(e);
+                    }
                     let proposed = self.proposed(target, dist, trace, variables)?;
-                    if self.all.iter().any(|p| p.target == proposed.target) {
+                    if self.played.all.iter().any(|p| p.target == proposed.target) {
                         return Err(fail(s.span, "this choice is proposed twice in one kernel".into()));
                     }
-                    self.all.push(proposed);
+                    self.played.all.push(proposed);
                 }
                 _ => {
                     let message = "a kernel that proposes has only `let`, `for` and `propose` in it";
@@ -98,6 +158,28 @@ impl Play<'_> {
         Ok(())
     }
 
+    /// Draws an auxiliary variable, or takes the value it is given.
+    fn auxiliary(
+        &mut self,
+        name: &Arc<str>,
+        dist: &Expr,
+        trace: &mut Trace,
+        variables: &[(Arc<str>, Value)],
+    ) -> TraceResult<Value> {
+        if self.moved.is_none() {
+            let mut e = fail(dist.span, format!("`{name}` is an auxiliary variable, which belongs to a map"));
+            e.hint = Some(format!("propose @x = value(@x) + {name}; propose {name} = -{name};"));
+            return Err(e);
+        }
+        let dist = self.distribution(dist, trace, variables)?;
+        let value = match &mut self.source {
+            Source::Drawn(rng) => Value::from_datum(&dist.sample(rng)),
+            Source::Given(values) => values.get(self.played.drawn.len()).cloned().unwrap_or_default(),
+        };
+        self.played.drawn.push(Drawn { name: Arc::clone(name), dist, value: value.clone() });
+        Ok(value)
+    }
+
     fn proposed(
         &self,
         target: &Expr,
@@ -105,12 +187,35 @@ impl Play<'_> {
         trace: &mut Trace,
         variables: &[(Arc<str>, Value)],
     ) -> TraceResult<Proposed> {
-        let mut env = self.env(trace, variables);
-        let at = address(target, &mut env)?;
-        let dist = match evaluate(dist, &mut env)? {
-            Value::Dist(d) => Dist::clone(&d),
-            v => return Err(fail(dist.span, format!("`propose` needs a distribution, got {}", v.type_name()))),
+        let (_, target) = self.choice(target, trace, variables)?;
+        Ok(Proposed { target, dist: self.distribution(dist, trace, variables)? })
+    }
+
+    fn distribution(&self, dist: &Expr, trace: &mut Trace, variables: &[(Arc<str>, Value)]) -> TraceResult<Dist> {
+        match evaluate(dist, &mut self.env(trace, variables))? {
+            Value::Dist(d) => Ok(Dist::clone(&d)),
+            v => Err(fail(dist.span, format!("`propose` needs a distribution, got {}", v.type_name()))),
+        }
+    }
+
+    /// What a map gives a new value to.
+    fn image(&self, target: &Expr, trace: &mut Trace, variables: &[(Arc<str>, Value)]) -> TraceResult<Image> {
+        let ExprKind::Var(name) = &target.kind else {
+            return self.choice(target, trace, variables).map(|(address, t)| Image::Choice(address, t));
         };
+        let drawn = self.played.drawn.iter().rposition(|d| d.name == *name);
+        let not = || fail(target.span, format!("`{name}` is no auxiliary variable: propose {name} ~ …; makes one"));
+        drawn.map(Image::Auxiliary).ok_or_else(not)
+    }
+
+    /// A choice that can be proposed.
+    fn choice(
+        &self,
+        target: &Expr,
+        trace: &mut Trace,
+        variables: &[(Arc<str>, Value)],
+    ) -> TraceResult<(Address, Target)> {
+        let at = address(target, &mut self.env(trace, variables))?;
         let Some(found) = trace.find(&at) else {
             let mut e = fail(target.span, format!("there is no choice {at} in this state"));
             e.hint = Some("a kernel can only propose choices that are there; mh and block make others appear".into());
@@ -120,15 +225,24 @@ impl Play<'_> {
             let message = format!("{at} cannot be proposed as a whole");
             return Err(fail(target.span, message));
         }
-        Ok(Proposed { target: found, dist })
+        Ok((at, found))
     }
 }
 
 /// Whether a kernel proposes values itself, rather than applying others.
 pub(crate) fn proposes(body: &[KStmt]) -> bool {
     body.iter().any(|s| match &s.kind {
-        KStmtKind::Propose { .. } => true,
+        KStmtKind::Propose { .. } | KStmtKind::Map { .. } => true,
         KStmtKind::For { body, .. } | KStmtKind::Repeat { body, .. } | KStmtKind::Every { body, .. } => proposes(body),
+        _ => false,
+    })
+}
+
+/// Whether a kernel maps choices by a rule.
+fn maps(body: &[KStmt]) -> bool {
+    body.iter().any(|s| match &s.kind {
+        KStmtKind::Map { .. } => true,
+        KStmtKind::For { body, .. } => maps(body),
         _ => false,
     })
 }
@@ -152,8 +266,11 @@ impl Kernel for Own {
     }
 
     fn step(&mut self, trace: &mut Trace, at: &At) -> TraceResult<Outcome> {
+        if maps(&self.declared.body) {
+            return self.involve(trace, at);
+        }
         let mut rng: Stream = at.stream();
-        let forth = self.play(trace, at)?;
+        let forth = self.proposals(trace, at)?;
         if forth.is_empty() {
             return Ok(Outcome::default());
         }
@@ -169,7 +286,7 @@ impl Kernel for Own {
         // The replay asks the new state, which must not be pending for that.
         let removed = trace.removed();
         trace.commit();
-        let back = recoverable(self.play(trace, at))?;
+        let back = recoverable(self.proposals(trace, at))?;
         let same = |back: &Vec<Proposed>| back.iter().map(|p| p.target).eq(forth.iter().map(|p| p.target));
         let log_back = back.filter(same).map_or(f64::NEG_INFINITY, |back| log_density(&back, &old));
         let ratio = at.tempered(&w) + log_back - log_density(&forth, &new);

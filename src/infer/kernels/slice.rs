@@ -1,4 +1,5 @@
-//! `slice(sel, width)`: slice sampling of one number at a time, with stepping out and shrinkage (Neal 2003, section 4).
+//! `slice(sel, width, doubling)`: slice sampling of one number at a time (Neal 2003, section 4): an interval around the present
+//! point by stepping out (figure 3) or doubling (figures 4 and 6), then shrinkage (figure 5).
 //!
 //! Each coordinate of the unconstrained space is moved in turn. A place where the program has no value, or where choices appear or
 //! vanish, counts as outside the slice, so the kernel moves within the present structure.
@@ -11,6 +12,9 @@ use rustc_hash::FxHashMap;
 /// At most so many widths are stepped out, shared at random between both sides, which keeps the kernel reversible.
 const STEPS_OUT: u32 = 32;
 
+/// An interval doubles at most so often.
+const DOUBLINGS: u32 = 16;
+
 /// An interval that has shrunk so often holds nothing but the present point.
 const SHRINKS: u32 = 200;
 
@@ -19,25 +23,27 @@ const SHRINKS: u32 = 200;
 pub struct Slice {
     scope: Registered,
     width: Option<f64>,
+    doubling: bool,
     /// By address and coordinate: widths learnt in warm-up, with the number of moves they are from.
     learnt: FxHashMap<(u64, usize), (f64, f64)>,
 }
 
 impl Slice {
-    /// The kernel for these choices, with a width in the unconstrained space, or else widths that are learnt.
-    pub fn new(scope: Scope, width: Option<f64>) -> Self {
-        Slice { scope: Registered::new(scope), width, learnt: FxHashMap::default() }
+    /// The kernel for these choices, with a width in the unconstrained space, or else widths that are learnt; the interval
+    /// doubles or steps out.
+    pub fn new(scope: Scope, width: Option<f64>, doubling: bool) -> Self {
+        Slice { scope: Registered::new(scope), width, doubling, learnt: FxHashMap::default() }
     }
 
     fn width(&self, key: (u64, usize)) -> f64 {
         self.width.unwrap_or_else(|| self.learnt.get(&key).map_or(1.0, |(w, _)| *w))
     }
 
-    /// Towards the mean length of the slices found.
-    fn learn(&mut self, key: (u64, usize), length: f64) {
+    /// Towards three times the mean distance moved: two points drawn from an interval are a third of its length apart.
+    fn learn(&mut self, key: (u64, usize), moved: f64) {
         let (width, count) = self.learnt.entry(key).or_insert((1.0, 0.0));
         *count += 1.0;
-        *width += (length.clamp(1e-6, 1e6) - *width) / count.min(50.0);
+        *width += ((3.0 * moved).clamp(1e-6, 1e6) - *width) / count.min(50.0);
     }
 }
 
@@ -64,12 +70,39 @@ impl Line<'_> {
         })
     }
 
-    /// Moves along the line; gives the length of the interval that was stepped out.
-    fn step(&mut self, width: f64, rng: &mut Stream) -> TraceResult<f64> {
-        let here = self.y[self.coordinate];
+    fn here(&self) -> f64 {
+        self.y[self.coordinate]
+    }
+
+    /// Moves along the line; gives how far.
+    fn step(&mut self, width: f64, doubling: bool, rng: &mut Stream) -> TraceResult<f64> {
+        let here = self.here();
         let level = libm::log(rng.open_uniform());
-        let mut left = here - width * rng.uniform();
-        let mut right = left + width;
+        let left = here - width * rng.uniform();
+        let first = (left, left + width);
+        let interval =
+            if doubling { self.double(first, level, rng)? } else { self.step_out(first, level, width, rng)? };
+        let (mut left, mut right) = interval;
+        for _ in 0..SHRINKS {
+            let x = left + (right - left) * rng.uniform();
+            if self.log_density(x)? > level && (!doubling || self.leads_back(x, interval, width, level)?) {
+                self.trace.commit();
+                return Ok((x - here).abs());
+            }
+            if x < here { left = x } else { right = x }
+        }
+        self.trace.rollback();
+        Ok(0.0)
+    }
+
+    /// Widens an interval at each end until that is outside the slice (figure 3).
+    fn step_out(
+        &mut self,
+        (mut left, mut right): (f64, f64),
+        level: f64,
+        width: f64,
+        rng: &mut Stream,
+    ) -> TraceResult<(f64, f64)> {
         let mut to_left = rng.index(STEPS_OUT as usize);
         let mut to_right = STEPS_OUT as usize - 1 - to_left;
         while to_left > 0 && self.log_density(left)? > level {
@@ -80,17 +113,48 @@ impl Line<'_> {
             right += width;
             to_right -= 1;
         }
-        let length = right - left;
-        for _ in 0..SHRINKS {
-            let x = left + (right - left) * rng.uniform();
-            if self.log_density(x)? > level {
-                self.trace.commit();
-                return Ok(length);
+        Ok((left, right))
+    }
+
+    /// Doubles an interval to either side at random until both ends are outside the slice (figure 4).
+    fn double(&mut self, (mut left, mut right): (f64, f64), level: f64, rng: &mut Stream) -> TraceResult<(f64, f64)> {
+        let (mut out_left, mut out_right) = (self.log_density(left)? <= level, self.log_density(right)? <= level);
+        for _ in 0..DOUBLINGS {
+            if out_left && out_right {
+                break;
             }
-            if x < here { left = x } else { right = x }
+            if rng.uniform() < 0.5 {
+                left -= right - left;
+                out_left = self.log_density(left)? <= level;
+            } else {
+                right += right - left;
+                out_right = self.log_density(right)? <= level;
+            }
         }
-        self.trace.rollback();
-        Ok(length)
+        Ok((left, right))
+    }
+
+    /// Whether doubling from `x` could have come to this interval: it would not have stopped at one of those that halving
+    /// towards `x` goes through (figure 6). If so, `x` is pending.
+    fn leads_back(&mut self, x: f64, (mut left, mut right): (f64, f64), width: f64, level: f64) -> TraceResult<bool> {
+        let here = self.here();
+        let mut differs = false;
+        while right - left > 1.1 * width {
+            let middle = left + 0.5 * (right - left);
+            differs |= (here < middle) != (x < middle);
+            if x < middle {
+                right = middle
+            } else {
+                left = middle
+            }
+            if differs && self.log_density(left)? <= level && self.log_density(right)? <= level {
+                return Ok(false);
+            }
+        }
+        if differs {
+            self.log_density(x)?;
+        }
+        Ok(true)
     }
 }
 
@@ -110,9 +174,10 @@ impl Kernel for Slice {
             while let Some((y, jacobian)) = trace.free(target).filter(|(y, _)| coordinate < y.len()) {
                 let key = (trace.address_hash(target), coordinate);
                 let width = self.width(key);
-                let length = Line { trace, at, target, y, coordinate, jacobian }.step(width, &mut rng)?;
+                let mut line = Line { trace, at, target, y, coordinate, jacobian };
+                let moved = line.step(width, self.doubling, &mut rng)?;
                 if at.adapting && self.width.is_none() {
-                    self.learn(key, length);
+                    self.learn(key, moved);
                 }
                 outcome.proposals += 1;
                 outcome.accepted += 1;

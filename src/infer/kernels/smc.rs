@@ -6,12 +6,12 @@
 //! Holenstein 2010, section 2.4.2) leaves the posterior exactly invariant for any number of particles. The powers are
 //! found in the first run, so that half of the weights count at each, and stay as they are.
 
-use crate::infer::kernel::{At, Kernel, Outcome, accepts, inner_step};
+use super::particles::Independent;
+use crate::infer::kernel::{At, Kernel, Outcome, inner_step};
 use crate::infer::resampling::systematic;
-use crate::infer::selection::fail;
 use crate::num::log_sum_exp;
 use crate::syntax::span::Span;
-use crate::trace::{Constraint, Selector, Trace, TraceResult};
+use crate::trace::{Selector, Trace, TraceResult};
 
 /// The most powers: a likelihood that needs more has no support where the prior has.
 const MOST_POWERS: usize = 1000;
@@ -20,38 +20,20 @@ const MOST_POWERS: usize = 1000;
 pub struct Smc {
     kernel: Box<dyn Kernel>,
     particles: usize,
-    /// Choices that are not drawn anew.
-    frozen: Selector,
-    span: Span,
     /// The powers of the likelihood, the last one 1; found in the first run.
     powers: Vec<f64>,
-    /// The state that was accepted last: its log joint density and the log of the evidence's estimate.
-    accepted: Option<(f64, f64)>,
-    /// The logs of all estimates.
-    estimates: Vec<f64>,
+    states: Independent,
 }
 
 impl Smc {
-    /// So many particles, moved by a kernel. `span` is where errors point.
+    /// So many particles, moved by a kernel; frozen choices are not drawn anew. `span` is where errors point.
     pub fn new(kernel: Box<dyn Kernel>, particles: usize, frozen: Selector, span: Span) -> Self {
-        Smc { kernel, particles, frozen, span, powers: Vec::new(), accepted: None, estimates: Vec::new() }
-    }
-
-    /// Particles from the prior; what is frozen stays.
-    fn draw(&self, trace: &mut Trace, at: &At) -> TraceResult<Vec<Trace>> {
-        let selection = trace.select(&self.frozen);
-        let fixed: Vec<(u64, Constraint)> = trace
-            .targets(selection)
-            .iter()
-            .filter_map(|t| Some((trace.address_hash(*t), Constraint::Stored(trace.stored(*t)?))))
-            .collect();
-        let one = |i: usize| trace.another(fixed.iter().cloned(), at.within(i as u64).draws(0));
-        (0..self.particles).map(one).collect()
+        Smc { kernel, particles, powers: Vec::new(), states: Independent::new("smc", frozen, span) }
     }
 
     /// Raises the power from 0 to 1; gives the particles and the log of the evidence's estimate.
     fn run(&mut self, trace: &mut Trace, at: &At) -> TraceResult<(Vec<Trace>, f64)> {
-        let mut particles = self.draw(trace, at)?;
+        let mut particles = self.states.draw(trace, self.particles, at)?;
         let find = self.powers.is_empty();
         let (mut power, mut log_evidence, mut rung) = (0.0, 0.0, 0);
         while power < 1.0 {
@@ -107,42 +89,14 @@ impl Kernel for Smc {
     }
 
     fn step(&mut self, trace: &mut Trace, at: &At) -> TraceResult<Outcome> {
-        trace.rollback();
-        if let Some((log_joint, _)) = self.accepted
-            && log_joint.to_bits() != trace.log_joint().to_bits()
-            && !at.adapting
-        {
-            let mut e = fail(self.span, "another kernel moved the state between two steps of smc".into());
-            e.hint = Some(
-                "smc draws whole states by itself; its estimate of the evidence belongs to the state it drew".into(),
-            );
-            return Err(e);
+        if self.states.begin(trace, at)? {
+            self.powers.clear();
         }
-        let (mut particles, log_evidence) = self.run(trace, at)?;
-        let mut rng = at.stream();
-        let one = rng.index(particles.len());
-        self.estimates.push(log_evidence);
-        let ratio = match self.accepted {
-            // The first state is a start like any other.
-            None => {
-                if log_evidence > f64::NEG_INFINITY {
-                    0.0
-                } else {
-                    f64::NEG_INFINITY
-                }
-            }
-            Some((_, old)) => log_evidence - old,
-        };
-        let accepted = accepts(ratio, &mut rng);
-        if accepted {
-            *trace = particles.swap_remove(one);
-            self.accepted = Some((trace.log_joint(), log_evidence));
-        }
-        Ok(Outcome::one(accepted))
+        let (particles, log_evidence) = self.run(trace, at)?;
+        Ok(self.states.decide(trace, particles, log_evidence, &mut at.stream()))
     }
 
     fn log_evidence(&self) -> Option<f64> {
-        let n = self.estimates.len();
-        (n > 0).then(|| log_sum_exp(&self.estimates) - libm::log(n as f64))
+        self.states.log_evidence()
     }
 }

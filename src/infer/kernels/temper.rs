@@ -57,6 +57,9 @@ impl Kernel for Temper {
         while self.replicas.len() < pairs {
             self.replicas.push(trace.clone());
         }
+        for replica in &mut self.replicas {
+            replica.observe_as(trace)?;
+        }
         let powers = self.powers();
         for (level, kernel) in self.kernels.iter_mut().enumerate() {
             let state = if level == 0 { &mut *trace } else { &mut self.replicas[level - 1] };

@@ -268,7 +268,15 @@ impl Runner<'_> {
     fn env(&mut self) -> Scope<'_> {
         let draws = self.predictive();
         let (started, steps) = (self.started, self.step);
-        Scope { code: self.code, trace: &mut self.trace, variables: &self.variables, draws, started, steps }
+        Scope {
+            code: self.code,
+            trace: &mut self.trace,
+            variables: &self.variables,
+            draws,
+            started,
+            steps,
+            moved: None,
+        }
     }
 
     fn value(&mut self, e: &Expr) -> Result<Value, Box<RunError>> {
@@ -347,7 +355,9 @@ impl Runner<'_> {
                 self.variables.push((Arc::clone(&name.node), v));
                 Ok(Flow::Next)
             }
-            KStmtKind::Propose { .. } => Err(fail(s.span, "`propose` belongs in a kernel".into()).into()),
+            KStmtKind::Propose { .. } | KStmtKind::Map { .. } => {
+                Err(fail(s.span, "`propose` belongs in a kernel".into()).into())
+            }
             KStmtKind::Expr(e) => self.apply(e),
         }
     }

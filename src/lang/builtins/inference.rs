@@ -10,7 +10,7 @@ const CHOICES: &str = "Selections and starts";
 const MONITORS: &str = "Monitors and reports";
 
 /// What this version checks and documents but cannot run.
-pub(super) const PLANNED: &[&str] = &["delayed", "marginal", "acceptance", "rhat", "ess", "snapshot"];
+pub(super) const PLANNED: &[&str] = &["acceptance", "rhat", "ess", "snapshot"];
 
 const fn name(
     name: &'static str,
@@ -23,6 +23,13 @@ const fn name(
 }
 
 const SEL: Arg = arg("sel", Type::Selection, "The choices it moves.");
+const MARGINAL: Arg = opt(
+    "marginal",
+    Type::Selection,
+    "none",
+    "Finite discrete choices that are summed out of the density it sees, then drawn given the rest. Those that share no \
+     observation are summed one by one, others jointly.",
+);
 const INNER: Arg = arg("move", Type::Kernel, "The kernel inside.");
 const X: Arg = arg("x", Type::Any, "A number of the model, as in `collect`.");
 
@@ -81,25 +88,37 @@ pub(super) const TABLE: &[Builtin] = &[
                 "learnt",
                 "The width of a step out, in the unconstrained space; without it, 1, and warm-up adapts it.",
             ),
+            opt(
+                "doubling",
+                Type::Bool,
+                "false",
+                "The interval doubles instead of growing by steps: for slices much wider than `width`.",
+            ),
         ],
         Type::Kernel,
-        "Slice sampling of one number at a time with stepping out (Neal 2003).",
+        "Slice sampling of one number at a time with stepping out or doubling (Neal 2003).",
     ),
     name(
         "hmc",
         KERNELS,
-        &[SEL, opt("steps", Type::Int, "10", "The leapfrog steps of one proposal.")],
+        &[SEL, opt("steps", Type::Int, "10", "The leapfrog steps of one proposal."), MARGINAL],
         Type::Kernel,
         "Hamiltonian Monte Carlo; step size and metric are adapted in warm-up (Neal 2011).",
     ),
     name(
         "nuts",
         KERNELS,
-        &[SEL, opt("max_depth", Type::Int, "10", "At most 2 to this power leapfrog steps.")],
+        &[SEL, opt("max_depth", Type::Int, "10", "At most 2 to this power leapfrog steps."), MARGINAL],
         Type::Kernel,
         "The No-U-Turn sampler (Hoffman and Gelman 2014).",
     ),
-    name("mala", KERNELS, &[SEL], Type::Kernel, "The Metropolis-adjusted Langevin algorithm: one gradient a proposal."),
+    name(
+        "mala",
+        KERNELS,
+        &[SEL, MARGINAL],
+        Type::Kernel,
+        "The Metropolis-adjusted Langevin algorithm: one gradient a proposal.",
+    ),
     name(
         "knn",
         KERNELS,
@@ -116,7 +135,8 @@ pub(super) const TABLE: &[Builtin] = &[
         KERNELS,
         &[INNER, arg("at", Type::Selection, "The observation with a coarse surrogate.")],
         Type::Kernel,
-        "Delayed acceptance: the surrogate decides first, the full likelihood corrects it (Christen and Fox 2005).",
+        "Delayed acceptance: the surrogate of `observe … with coarse = …` decides first; only what passes is judged by the observation \
+         itself (Christen and Fox 2005). Exact whatever the surrogate says, if it is possible wherever the observation is.",
     ),
     name(
         "temper",
@@ -140,7 +160,18 @@ pub(super) const TABLE: &[Builtin] = &[
     name(
         "abc",
         KERNELS,
-        &[INNER, arg("eps", Type::Num, "The largest distance that is accepted.")],
+        &[
+            INNER,
+            arg("eps", Type::Num, "The largest distance that is accepted."),
+            opt(
+                "particles",
+                Type::Int,
+                "none",
+                "Each step draws a whole state by so many particles, as `smc` does, with tolerances that fall to `eps` (Del Moral \
+                 et al. 2012).",
+            ),
+            opt("moves", Type::Int, "1", "How often each particle moves at each tolerance."),
+        ],
         Type::Kernel,
         "Likelihood-free: the kernel inside proposes from the prior, and what it proposes stays if data drawn from it are near those \
          observed, in root mean square (Marjoram et al. 2003).",
@@ -151,13 +182,6 @@ pub(super) const TABLE: &[Builtin] = &[
         &[SEL, opt("steps", Type::Int, "100", "The number of gradient steps.")],
         Type::Kernel,
         "Climbs to a mode of the posterior; for a start, or an answer in a hurry. Not a sampler.",
-    ),
-    name(
-        "marginal",
-        CHOICES,
-        &[SEL],
-        Type::Selection,
-        "In hmc and nuts: the selected finite discrete choices are summed out of the density.",
     ),
     name(
         "one",

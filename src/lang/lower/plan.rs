@@ -111,8 +111,22 @@ impl Lowerer<'_> {
                     self.error("`propose` belongs in a kernel", s.span, "outside of one")
                         .hint_also("kernel name(…) { … propose @x ~ d; … }");
                 }
-                self.selection(target, &around.names.clone());
                 self.plan_expr(dist, around);
+                match &target.kind {
+                    // An auxiliary variable of a map.
+                    ExprKind::Var(name) if around.in_kernel && !self.roots.contains(name) => {
+                        around.names.push(Arc::clone(name))
+                    }
+                    _ => self.selection(target, &around.names.clone()),
+                }
+            }
+            KStmtKind::Map { target, value } => {
+                if !around.in_kernel {
+                    self.error("`propose` belongs in a kernel", s.span, "outside of one")
+                        .hint_also("kernel name(…) { … propose @x = e; … }");
+                }
+                self.selection(target, &around.names.clone());
+                self.plan_expr(value, around);
             }
             KStmtKind::Let { name, expr } => {
                 self.plan_expr(expr, around);
@@ -240,6 +254,14 @@ impl Lowerer<'_> {
     }
 
     fn kernel_or_start(&mut self, outer: &str, e: &Expr, around: &Around) {
+        if outer == "delayed"
+            && let ExprKind::Call { callee, .. } = &e.kind
+            && let ExprKind::Var(inner) = &callee.kind
+            && ["temper", "smc", "abc", "optimize"].contains(&&**inner)
+        {
+            self.error(format!("`delayed` does not take `{inner}`"), e.span, "not a reversible move of one state")
+                .hint_also("for example delayed(drift(@x), @obs)");
+        }
         if outer != "init" {
             return self.kernel(e, around);
         }

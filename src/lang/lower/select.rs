@@ -37,7 +37,7 @@ impl Lowerer<'_> {
                     _ => "",
                 };
                 match (name, &args[..]) {
-                    ("one" | "each" | "marginal", [a]) => self.selection(&a.value, names),
+                    ("one" | "each", [a]) => self.selection(&a.value, names),
                     _ => {
                         self.error("expected a selection of choices", e.span, "not a selection")
                             .hint_also("an address such as @**, a tag such as $affine, or one(…) or each(…) of either");

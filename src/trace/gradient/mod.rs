@@ -46,13 +46,15 @@ pub(super) struct Reverse<'a> {
     /// The active nodes, operands first.
     order: Vec<NodeId>,
     adjoints: FxHashMap<NodeId, Adjoint>,
-    /// The power of the likelihood.
+    /// The weight of the log density that is being differentiated, and that times the power of the likelihood.
+    weight: f64,
     power: f64,
 }
 
 impl Graph {
     /// The gradient, by the unconstrained coordinates of the targets one after the other, of the log prior plus `power` times
-    /// the log likelihood plus the log Jacobians of the transforms. Discrete targets have no coordinates.
+    /// the log likelihood plus the log Jacobians of the transforms, with a weight for each score. Discrete targets have no
+    /// coordinates.
     ///
     /// # Errors
     /// A dependence on a target that has no derivative, with the operation that has none.
@@ -61,14 +63,15 @@ impl Graph {
         code: &Code,
         targets: &[Target],
         scored: &[NodeId],
-        power: f64,
+        (power, weight): (f64, &dyn Fn(NodeId) -> f64),
         out: &mut Vec<f64>,
     ) -> Result<(), Failure> {
         let mut marks = vec![Mark::Unseen; self.nodes.len()];
         for t in targets {
             marks[t.node as usize] = Mark::Target;
         }
-        let mut pass = Reverse { graph: self, code, marks, order: Vec::new(), adjoints: FxHashMap::default(), power };
+        let mut pass =
+            Reverse { graph: self, code, marks, order: Vec::new(), adjoints: FxHashMap::default(), weight: 1.0, power };
         for t in targets {
             pass.visit(t.node);
         }
@@ -83,6 +86,8 @@ impl Graph {
             }
         }
         for n in active_scores {
+            pass.weight = weight(n);
+            pass.power = pass.weight * power;
             pass.pull_score(n)?;
         }
         let mut own: FxHashMap<NodeId, Option<Own>> = targets.iter().map(|t| (t.node, None)).collect();

@@ -42,6 +42,7 @@ impl Graph {
             marks: Vec::new(),
             order: Vec::new(),
             adjoints: FxHashMap::default(),
+            weight: 1.0,
             power: 1.0,
         };
         let mut r = Recorder {

@@ -46,14 +46,16 @@ impl Reverse<'_> {
                     // Added where the noise's own derivative is made.
                     return Ok(());
                 }
-                let Some((by_x, params)) = density::gradient(&dist, &Value::from_datum(&stored)) else {
+                let Some((mut by_x, mut params)) = density::gradient(&dist, &Value::from_datum(&stored)) else {
                     return Err(self.no_derivative(n, &format!("the density of `{}`", dist.name())));
                 };
+                by_x.scale(self.weight);
+                params.iter_mut().for_each(|p| *p *= self.weight);
                 if own {
                     self.give_node(n, by_x);
                 }
                 self.give_params(n, spec, &dist, params)?;
-                self.give_matrix(n, spec, &dist, &stored, &[], 1.0)?;
+                self.give_matrix(n, spec, &dist, &stored, &[], self.weight)?;
             }
             Op::Observe { dist: spec, value, .. } => {
                 let mut deps = Deps::new();

@@ -1,13 +1,16 @@
 //! `hmc(sel, steps)` and `mala(sel)`: trajectories of a fixed number of leapfrog steps (Neal 2011).
 
+use super::summed::with_alternatives;
 use super::{Adaptation, DIVERGENT, Memory, System, system};
-use crate::infer::kernel::{At, Kernel, Outcome, Registered, Scope, accepts};
-use crate::trace::{Trace, TraceResult};
+use crate::infer::kernel::{At, Kernel, Outcome, Pick, Registered, Scope, accepts};
+use crate::trace::{Selector, Target, Trace, TraceResult};
 
 /// Hamiltonian Monte Carlo; with one step it is the Metropolis-adjusted Langevin algorithm.
 #[derive(Clone, Debug)]
 pub struct Hmc {
     scope: Registered,
+    /// Finite choices that are summed out.
+    summed: Registered,
     steps: u32,
     adaptation: Adaptation,
     memory: Memory,
@@ -19,7 +22,14 @@ impl Hmc {
         // The best acceptance of long trajectories, and of Langevin steps (Roberts & Rosenthal 1998, Beskos et al. 2013).
         let target = if steps == 1 { 0.574 } else { 0.8 };
         let adaptation = Adaptation::new(target, step);
-        Hmc { scope: Registered::new(scope), steps: steps.max(1), adaptation, memory: Memory::default() }
+        let (scope, summed) = (Registered::new(scope), Registered::nothing());
+        Hmc { scope, summed, steps: steps.max(1), adaptation, memory: Memory::default() }
+    }
+
+    /// The same with these finite choices summed out of the density that it sees.
+    #[must_use]
+    pub fn summing_out(self, choices: Selector) -> Self {
+        Hmc { summed: Registered::new(Scope { selector: choices, pick: Pick::All }), ..self }
     }
 }
 
@@ -29,9 +39,18 @@ impl Kernel for Hmc {
     }
 
     fn step(&mut self, trace: &mut Trace, at: &At) -> TraceResult<Outcome> {
+        let mut summed = self.summed.clone();
+        let outcome = with_alternatives(&mut summed, trace, at, |trace, sites| self.go(trace, at, sites));
+        self.summed = summed;
+        outcome
+    }
+}
+
+impl Hmc {
+    fn go(&mut self, trace: &mut Trace, at: &At, sites: &[Target]) -> TraceResult<Outcome> {
         let mut rng = at.stream();
         let (targets, _) = self.scope.members(trace, at, &mut rng);
-        let Some((mut system, here)) = System::begin(trace, at, &targets, &mut self.memory)? else {
+        let Some((mut system, here)) = System::begin(trace, at, &targets, sites, &mut self.memory)? else {
             return Ok(Outcome::default());
         };
         let step = self.adaptation.step(&mut system, &here, at.adapting, &mut rng)?;

@@ -10,6 +10,7 @@ mod hmc;
 mod memory;
 mod nuts;
 mod optimize;
+mod summed;
 mod system;
 
 pub use hmc::Hmc;

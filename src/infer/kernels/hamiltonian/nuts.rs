@@ -1,17 +1,20 @@
 //! `nuts(sel, max_depth)`: the No-U-Turn sampler (Hoffman & Gelman 2014) with multinomial sampling over the trajectory and the
 //! generalised stopping rule, checked across subtrees too (Betancourt 2017; as Stan has it).
 
+use super::summed::with_alternatives;
 use super::{Adaptation, DIVERGENT, Memory, Point, System, system};
-use crate::infer::kernel::{At, Kernel, Outcome, Registered, Scope};
+use crate::infer::kernel::{At, Kernel, Outcome, Pick, Registered, Scope};
 use crate::num::log_sum_exp;
 use crate::rng::Stream;
-use crate::trace::{Trace, TraceResult};
+use crate::trace::{Selector, Target, Trace, TraceResult};
 use std::sync::Arc;
 
 /// The No-U-Turn sampler.
 #[derive(Clone, Debug)]
 pub struct Nuts {
     scope: Registered,
+    /// Finite choices that are summed out.
+    summed: Registered,
     max_depth: u32,
     adaptation: Adaptation,
     memory: Memory,
@@ -21,7 +24,14 @@ impl Nuts {
     /// The kernel for these choices; a trajectory doubles at most `max_depth` times.
     pub fn new(scope: Scope, max_depth: u32) -> Self {
         let adaptation = Adaptation::new(0.8, None);
-        Nuts { scope: Registered::new(scope), max_depth, adaptation, memory: Memory::default() }
+        let (scope, summed) = (Registered::new(scope), Registered::nothing());
+        Nuts { scope, summed, max_depth, adaptation, memory: Memory::default() }
+    }
+
+    /// The same with these finite choices summed out of the density that it sees.
+    #[must_use]
+    pub fn summing_out(self, choices: Selector) -> Self {
+        Nuts { summed: Registered::new(Scope { selector: choices, pick: Pick::All }), ..self }
     }
 }
 
@@ -118,9 +128,18 @@ impl Kernel for Nuts {
     }
 
     fn step(&mut self, trace: &mut Trace, at: &At) -> TraceResult<Outcome> {
+        let mut summed = self.summed.clone();
+        let outcome = with_alternatives(&mut summed, trace, at, |trace, sites| self.go(trace, at, sites));
+        self.summed = summed;
+        outcome
+    }
+}
+
+impl Nuts {
+    fn go(&mut self, trace: &mut Trace, at: &At, sites: &[Target]) -> TraceResult<Outcome> {
         let mut rng = at.stream();
         let (targets, _) = self.scope.members(trace, at, &mut rng);
-        let Some((mut system, here)) = System::begin(trace, at, &targets, &mut self.memory)? else {
+        let Some((mut system, here)) = System::begin(trace, at, &targets, sites, &mut self.memory)? else {
             return Ok(Outcome::default());
         };
         let step = self.adaptation.step(&mut system, &here, at.adapting, &mut rng)?;

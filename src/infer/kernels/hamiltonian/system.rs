@@ -4,6 +4,7 @@
 //! reverse passes through the trace: the same densities to the last bit. What a transition ends with is a proposal either way.
 
 use super::memory::{Layout, Memory};
+use super::summed::Summed;
 use crate::infer::kernel::{At, recoverable};
 use crate::num::ExactSum;
 use crate::rng::Stream;
@@ -24,35 +25,39 @@ pub(super) struct Point {
 
 /// A trace as a system; proposals are pending until [`System::settle`].
 pub(super) struct System<'a> {
-    trace: &'a mut Trace,
-    at: &'a At,
-    memory: &'a mut Memory,
-    layout: Arc<Layout>,
+    pub(super) trace: &'a mut Trace,
+    pub(super) at: &'a At,
+    pub(super) memory: &'a mut Memory,
+    pub(super) layout: Arc<Layout>,
     /// Whether the memory has a tape of the state the trace is in.
     taped: bool,
     jacobian: f64,
+    pub(super) summed: Option<Summed>,
 }
 
 impl<'a> System<'a> {
-    /// The continuous ones of some choices, and where they are. `None` if there are none, or the density there has no slope.
+    /// The continuous ones of some choices, and where they are; `sites` are summed out. `None` if there are no continuous ones,
+    /// or the density there has no slope.
     ///
     /// # Errors
-    /// An operation that has no derivative.
+    /// An operation that has no derivative; choices that cannot be summed out.
     pub fn begin(
         trace: &'a mut Trace,
         at: &'a At,
         all: &[Target],
+        sites: &[Target],
         memory: &'a mut Memory,
     ) -> TraceResult<Option<(Self, Arc<Point>)>> {
         trace.rollback();
         let mut here = memory.point();
         let Some(point) = Arc::get_mut(&mut here) else { return Ok(None) };
         point.log_density = 0.0;
-        if let Some(layout) = memory.stand(trace, all, &mut point.y)
+        if sites.is_empty()
+            && let Some(layout) = memory.stand(trace, all, &mut point.y)
             && memory.gradient(&point.y, at.power, &mut point.gradient)
         {
             let jacobian = memory.log_jacobian();
-            let system = System { trace, at, layout, memory, taped: true, jacobian };
+            let system = System { trace, at, layout, memory, taped: true, jacobian, summed: None };
             return Ok(system.usable(here));
         }
         let mut jacobian = ExactSum::default();
@@ -68,9 +73,14 @@ impl<'a> System<'a> {
             return Ok(None);
         }
         let layout = Arc::new(layout);
-        let taped =
-            memory.record(trace, &layout, &mut point.y) && memory.gradient(&point.y, at.power, &mut point.gradient);
-        let mut system = System { trace, at, memory, layout, taped, jacobian: jacobian.value() };
+        let taped = sites.is_empty()
+            && memory.record(trace, &layout, &mut point.y)
+            && memory.gradient(&point.y, at.power, &mut point.gradient);
+        let mut system = System { trace, at, memory, layout, taped, jacobian: jacobian.value(), summed: None };
+        if !sites.is_empty() {
+            let there = system.sum_out(sites, point)?;
+            return Ok(if there { system.usable(here) } else { None });
+        }
         if !taped {
             system.memory.give_up();
             system.force(point)?;
@@ -102,6 +112,9 @@ impl<'a> System<'a> {
     fn evaluate(&mut self, point: &mut Point) -> TraceResult<bool> {
         if point.y.iter().any(|x| !x.is_finite()) {
             return Ok(false);
+        }
+        if self.summed.is_some() {
+            return self.evaluate_summed(point);
         }
         if self.taped
             && let Some(w) = self.memory.weigh(&point.y)
@@ -176,8 +189,11 @@ impl<'a> System<'a> {
         self.memory.numbers(from)
     }
 
-    /// Makes a place the state of the trace, or leaves it where it was.
+    /// Makes a place the state of the trace, or leaves it where it was; draws what was summed out.
     pub fn settle(mut self, to: Option<&Point>) -> TraceResult<bool> {
+        if let Some(summed) = self.summed.take() {
+            return self.settle_summed(summed, to);
+        }
         let Some(point) = to else {
             self.trace.rollback();
             return Ok(false);

@@ -1,0 +1,111 @@
+//! `abc(move, eps, particles)`: approximate Bayesian computation by sequential Monte Carlo with tolerances that fall (Del Moral,
+//! Doucet & Jasra 2012), as a proposal.
+//!
+//! Particles drawn from the prior, each with data drawn from it, are kept while those data are within the tolerance;
+//! copies fill the places of the others, and all move by the kernel inside as `abc` does. The product of the shares that were
+//! kept estimates without bias how probable data within `eps` are, so accepting one of the last particles with the ratio
+//! of the estimates leaves the prior given such data invariant for any number of particles (see `particles.rs`). The tolerances
+//! are found in the first run, so that half of the particles are kept at each, and stay as they are.
+
+use super::abc::{simulate, step_within};
+use super::particles::Independent;
+use crate::infer::kernel::{At, Kernel, Outcome};
+use crate::infer::resampling::systematic;
+use crate::syntax::span::Span;
+use crate::trace::{Selector, Trace, TraceResult};
+
+/// The most tolerances.
+const MOST: usize = 1000;
+
+/// Particle independent Metropolis-Hastings without likelihoods.
+pub struct AbcSmc {
+    kernel: Box<dyn Kernel>,
+    eps: f64,
+    particles: usize,
+    /// How often each particle moves at each tolerance.
+    moves: u32,
+    span: Span,
+    /// Falling, the last one `eps`; found in the first run.
+    tolerances: Vec<f64>,
+    states: Independent,
+}
+
+impl AbcSmc {
+    /// A kernel, the largest distance, the numbers of particles and of their moves at each tolerance; frozen choices are not
+    /// drawn anew. `span` is where errors point.
+    pub fn new(
+        kernel: Box<dyn Kernel>,
+        eps: f64,
+        (particles, moves): (usize, u32),
+        frozen: Selector,
+        span: Span,
+    ) -> Self {
+        let states = Independent::new("abc", frozen, span);
+        AbcSmc { kernel, eps, particles, moves, span, tolerances: Vec::new(), states }
+    }
+
+    /// Lowers the tolerance to `eps`; gives the particles and the log of the estimate.
+    fn run(&mut self, trace: &mut Trace, at: &At) -> TraceResult<(Vec<Trace>, f64)> {
+        let mut particles = self.states.draw(trace, self.particles, at)?;
+        let mut distances = Vec::with_capacity(particles.len());
+        for (i, p) in particles.iter().enumerate() {
+            distances.push(simulate(p, at.within(i as u64).draws(1), self.span)?);
+        }
+        let find = self.tolerances.is_empty();
+        let (mut tolerance, mut log_kept, mut rung) = (f64::INFINITY, 0.0, 0);
+        while tolerance > self.eps {
+            if find {
+                let next = if rung + 1 < MOST { next_tolerance(&distances, tolerance) } else { self.eps };
+                self.tolerances.push(next.max(self.eps));
+            }
+            tolerance = self.tolerances[rung];
+            rung += 1;
+            let kept: Vec<f64> = distances.iter().map(|d| f64::from(u8::from(*d <= tolerance))).collect();
+            let count: f64 = kept.iter().sum();
+            if count == 0.0 {
+                if find {
+                    self.tolerances.clear();
+                }
+                return Ok((particles, f64::NEG_INFINITY));
+            }
+            log_kept += libm::log(count / self.particles as f64);
+            let within = at.within((1 << 32) + rung as u64);
+            let chosen = systematic(&kept, self.particles, &mut within.stream());
+            particles = chosen.iter().map(|i| particles[*i].clone()).collect();
+            distances = chosen.iter().map(|i| distances[*i]).collect();
+            for (i, (p, d)) in particles.iter_mut().zip(&mut distances).enumerate() {
+                for step in 0..self.moves {
+                    let at = within.within(i as u64).within(step.into());
+                    step_within(&mut *self.kernel, p, &at, (d, tolerance), self.span)?;
+                }
+            }
+        }
+        Ok((particles, log_kept))
+    }
+}
+
+/// The tolerance that keeps half of the particles, or as many as there are below the present one.
+fn next_tolerance(distances: &[f64], present: f64) -> f64 {
+    let mut sorted = distances.to_vec();
+    sorted.sort_by(f64::total_cmp);
+    let half = &sorted[..sorted.len().div_ceil(2)];
+    half.iter().rev().find(|d| **d < present).copied().unwrap_or(0.0)
+}
+
+impl Kernel for AbcSmc {
+    fn name(&self) -> String {
+        "abc".into()
+    }
+
+    fn step(&mut self, trace: &mut Trace, at: &At) -> TraceResult<Outcome> {
+        if self.states.begin(trace, at)? {
+            self.tolerances.clear();
+        }
+        let (particles, log_kept) = self.run(trace, at)?;
+        Ok(self.states.decide(trace, particles, log_kept, &mut at.stream()))
+    }
+
+    fn log_evidence(&self) -> Option<f64> {
+        self.states.log_evidence()
+    }
+}

@@ -1,0 +1,103 @@
+//! `delayed(move, at)`: delayed acceptance (Christen & Fox 2005) in the form of surrogate transitions (Liu 2001, section 9.4.3).
+//!
+//! Beside the chain's trace there is a twin, in which the coarse surrogates of the observations at `at` stand in their place. The
+//! kernel inside moves the twin, its own test and proposal ratio included; only what it accepts goes to the chain's trace, where
+//! the ratio (fine change / coarse change) decides. Any kernel that is reversible under the surrogate leaves the
+//! posterior invariant in this way, whatever the surrogate says, as long as it is possible wherever the observation is. The observation
+//! itself is evaluated for what the first stage lets through, and for nothing else.
+
+use crate::infer::kernel::{At, Kernel, Outcome, decide, recoverable};
+use crate::infer::selection::fail;
+use crate::syntax::span::Span;
+use crate::trace::{Selector, Trace, TraceResult};
+
+/// Two-stage acceptance around a reversible kernel.
+pub struct Delayed {
+    kernel: Box<dyn Kernel>,
+    /// The observations whose surrogates decide first.
+    observations: Selector,
+    span: Span,
+    /// The trace under the surrogates.
+    twin: Option<Trace>,
+}
+
+impl Delayed {
+    /// A kernel, and the observations that have surrogates. `span` is where errors point.
+    pub fn new(kernel: Box<dyn Kernel>, observations: Selector, span: Span) -> Self {
+        Delayed { kernel, observations, span, twin: None }
+    }
+
+    /// Brings the twin to the present state.
+    fn follow(&mut self, trace: &mut Trace) -> TraceResult<&mut Trace> {
+        trace.rollback();
+        let twin = match self.twin.take() {
+            Some(mut twin) => {
+                twin.observe_as(trace)?;
+                twin.propose_choices_of(trace)?;
+                twin.commit();
+                twin
+            }
+            None => match trace.under_surrogates(&self.observations)? {
+                Some(twin) => twin,
+                None => {
+                    let mut e = fail(self.span, "delayed: no observation there has a coarse surrogate".into());
+                    e.hint = Some("observe normal(x, 1) = 2 with coarse = normal(x, 2) as y; … delayed(…, @y)".into());
+                    return Err(e);
+                }
+            },
+        };
+        if let Some(extra) = trace.lacks(&twin) {
+            let address = twin.address(extra);
+            return Err(fail(self.span, format!("delayed: only the surrogate asks for the choice {address}")));
+        }
+        Ok(self.twin.insert(twin))
+    }
+}
+
+/// The log prior and the log likelihood at a power.
+fn tempered(trace: &Trace, power: f64) -> f64 {
+    let likelihood = if power == 0.0 { 0.0 } else { power * trace.log_likelihood() };
+    trace.log_prior() + likelihood
+}
+
+impl Kernel for Delayed {
+    fn name(&self) -> String {
+        format!("delayed {}", self.kernel.name())
+    }
+
+    fn sweep(&mut self, trace: &mut Trace) -> Option<usize> {
+        // What goes wrong shows in the step.
+        self.follow(trace).ok()?;
+        self.kernel.sweep(self.twin.as_mut()?)
+    }
+
+    fn step(&mut self, trace: &mut Trace, at: &At) -> TraceResult<Outcome> {
+        self.follow(trace)?;
+        let Some(twin) = &mut self.twin else { return Ok(Outcome::default()) };
+        let before = tempered(twin, at.power);
+        let more = trace.choice_count() - twin.choice_count();
+        let inner = self.kernel.step(twin, &At { member: at.member, ..at.within(0) })?;
+        twin.rollback();
+        if inner.accepted == 0 {
+            return Ok(Outcome { site: None, ..inner });
+        }
+        let coarse = tempered(twin, at.power) - before;
+        let mut outcome = match recoverable(trace.propose_choices_of(twin))? {
+            None => Outcome { accepted: 0, failed: 1, ..inner },
+            Some(w) => {
+                let fine =
+                    if at.power == 1.0 { w.log_joint } else { w.log_joint - (1.0 - at.power) * w.log_likelihood };
+                // Choices that only the observation asks for stay as they are.
+                let same = trace.lacks(twin).is_none() && trace.choice_count() - twin.choice_count() == more;
+                let decided = decide(trace, if same { fine - coarse } else { f64::NEG_INFINITY }, &mut at.stream());
+                Outcome { accepted: decided.accepted.min(inner.accepted), ..inner }
+            }
+        };
+        if outcome.accepted == 0 {
+            twin.propose_choices_of(trace)?;
+            twin.commit();
+        }
+        outcome.site = None;
+        Ok(outcome)
+    }
+}

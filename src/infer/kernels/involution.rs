@@ -1,0 +1,205 @@
+//! Kernels of a program that map choices to others by a rule: involutive Metropolis-Hastings (Tierney 1998; Neklyudov et al.
+//! 2020; Cusumano-Towner, Lew & Mansinghka 2020).
+//!
+//! The body of the kernel draws auxiliary variables (`propose u ~ d;`) and gives new values of choices and auxiliary variables
+//! (`propose @x = e; propose u = e;`; an auxiliary variable without one stays). The map must be its own inverse: at
+//! each move it is played again where it led, and has to lead back. The log ratio has the log absolute determinant of its
+//! Jacobian over the numbers among choices and auxiliary variables, found by differences of fourth order. So that these see
+//! everything, the body reads choices by `value(@x)` alone.
+
+use super::own::{Image, Own, Played, Source};
+use crate::dist::Datum;
+use crate::infer::kernel::{At, Outcome, accepts, recoverable};
+use crate::infer::selection::fail;
+use crate::lang::error::RunError;
+use crate::lang::value::Value;
+use crate::trace::{Address, Change, Target, Trace, TraceResult};
+use nalgebra::DMatrix;
+
+/// How far from where it began the map may lead back to, relative to the numbers.
+const TOLERANCE: f64 = 1e-6;
+
+/// A choice or an auxiliary variable, with its value and what that becomes.
+struct Mapped {
+    choice: Option<(Address, Target)>,
+    old: Value,
+    new: Value,
+    is_continuous: bool,
+}
+
+/// What a play maps: choices in the order of the body, then all auxiliary variables.
+fn mapped(played: &Played, trace: &Trace) -> Vec<Mapped> {
+    let mut all = Vec::new();
+    for (image, new) in &played.images {
+        let Image::Choice(address, target) = image else { continue };
+        let is_continuous = trace.dist(*target).is_some_and(|d| !d.support().is_discrete());
+        all.push(Mapped {
+            choice: Some((address.clone(), *target)),
+            old: trace.value(*target),
+            new: new.clone(),
+            is_continuous,
+        });
+    }
+    for (i, drawn) in played.drawn.iter().enumerate() {
+        let image = played.images.iter().find(|(image, _)| matches!(image, Image::Auxiliary(j) if *j == i));
+        let new = image.map_or(&drawn.value, |(_, v)| v).clone();
+        let is_continuous = !drawn.dist.support().is_discrete();
+        all.push(Mapped { choice: None, old: drawn.value.clone(), new, is_continuous });
+    }
+    all
+}
+
+/// The numbers in a value, one after the other.
+fn numbers(v: &Value) -> Vec<f64> {
+    match v {
+        Value::Num(x) => vec![*x],
+        Value::Array(xs) => xs.to_vec(),
+        _ => Vec::new(),
+    }
+}
+
+/// The same value with other numbers.
+fn with_numbers(v: &Value, numbers: &mut impl Iterator<Item = f64>) -> Value {
+    match v {
+        Value::Num(x) => Value::Num(numbers.next().unwrap_or(*x)),
+        Value::Array(xs) => Value::from_elements(xs.iter().map(|x| Value::Num(numbers.next().unwrap_or(*x))).collect()),
+        v => v.clone(),
+    }
+}
+
+/// Whether two values are the same but for rounding.
+fn near(a: &Value, b: &Value) -> bool {
+    let close = |a: f64, b: f64| (a - b).abs() <= TOLERANCE * (1.0 + a.abs().max(b.abs()));
+    match (a, b) {
+        (Value::Num(a), Value::Num(b)) => close(*a, *b),
+        (Value::Array(a), Value::Array(b)) => a.len() == b.len() && a.iter().zip(b.iter()).all(|(a, b)| close(*a, *b)),
+        (a, b) => a.same(b),
+    }
+}
+
+/// The log density of drawing these auxiliary values.
+fn log_density(played: &Played, values: &[Value]) -> f64 {
+    let one = |(d, v): (&super::own::Drawn, &Value)| match v.to_datum() {
+        Some(x) if d.dist.support().fits(&x) => d.dist.log_density(&x),
+        _ => f64::NEG_INFINITY,
+    };
+    played.drawn.iter().zip(values).map(one).sum()
+}
+
+impl Own {
+    /// One step by a map.
+    pub(super) fn involve(&self, trace: &mut Trace, at: &At) -> TraceResult<Outcome> {
+        trace.rollback();
+        let mut rng = at.stream();
+        let forth = self.play(trace, at, Source::Drawn(&mut rng), Some(&[]))?;
+        let forth_map = mapped(&forth, trace);
+        let log_jacobian = self.log_jacobian(trace, at, &forth, &forth_map)?;
+        let (mut changes, mut undo) = (Vec::new(), Vec::new());
+        for m in &forth_map {
+            let Some((address, t)) = &m.choice else { continue };
+            let (Some(new), Some(old)) = (m.new.to_datum(), trace.stored(*t)) else {
+                return Err(self.fault(format!("{address} cannot become {}", m.new.type_name())));
+            };
+            if has_nan(&new) {
+                return Err(self.fault(format!("what {address} becomes is not a number")));
+            }
+            changes.push((*t, Change::Set(new)));
+            undo.push((*t, Change::Set(old)));
+        }
+        let Some(w) = recoverable(trace.propose(&changes, at.draws(0)))? else { return Ok(Outcome::failed()) };
+        if changes.iter().any(|(t, _)| trace.was_removed(*t)) || w.log_weight == f64::NEG_INFINITY {
+            trace.rollback();
+            return Ok(Outcome::one(false));
+        }
+        let removed = trace.removed();
+        trace.commit();
+        let auxiliaries: Vec<Value> = forth_map.iter().filter(|m| m.choice.is_none()).map(|m| m.new.clone()).collect();
+        let back = recoverable(self.play(trace, at, Source::Given(&auxiliaries), Some(&[])));
+        let (log_back, wrong) = match &back {
+            Ok(Some(back)) => (log_density(back, &auxiliaries), self.does_not_return(&forth_map, &mapped(back, trace))),
+            _ => (f64::NEG_INFINITY, None),
+        };
+        let drawn: Vec<Value> = forth.drawn.iter().map(|d| d.value.clone()).collect();
+        let ratio = at.tempered(&w) + log_back - log_density(&forth, &drawn) + log_jacobian;
+        // A place that the auxiliary variables cannot lead back from is refused, whatever the map does there.
+        let wrong = wrong.filter(|_| log_back > f64::NEG_INFINITY);
+        if wrong.is_none() && back.is_ok() && accepts(ratio, &mut rng) {
+            return Ok(Outcome::one(true));
+        }
+        trace.propose_constrained(&undo, &removed, at.draws(1))?;
+        trace.commit();
+        match (wrong, back) {
+            (Some(e), _) | (None, Err(e)) => Err(e),
+            _ => Ok(Outcome::one(false)),
+        }
+    }
+
+    /// What is wrong if the map does not lead back to where it began.
+    fn does_not_return(&self, forth: &[Mapped], back: &[Mapped]) -> Option<Box<RunError>> {
+        let same = |(f, b): (&Mapped, &Mapped)| f.choice.as_ref().map(|c| c.1) == b.choice.as_ref().map(|c| c.1);
+        let hint = "applied to what it gives, it must give what it was applied to";
+        let wrong = if forth.len() != back.len() || !forth.iter().zip(back).all(same) {
+            self.fault("it maps other choices where it leads to".into())
+        } else {
+            let (f, b) = forth.iter().zip(back).find(|(f, b)| !near(&f.old, &b.new))?;
+            let name = f.choice.as_ref().map_or("an auxiliary variable".to_owned(), |(a, _)| a.to_string());
+            self.fault(format!("applied twice, it takes {name} from {} to {}", f.old, b.new))
+        };
+        Some(Box::new(RunError { hint: Some(hint.into()), ..*wrong }))
+    }
+
+    fn fault(&self, what: String) -> Box<RunError> {
+        let name = &self.declared.name;
+        fail(name.span, format!("the map of the kernel `{}` is no involution: {what}", name.node))
+    }
+
+    /// The log of the absolute determinant of the map's Jacobian.
+    fn log_jacobian(&self, trace: &mut Trace, at: &At, played: &Played, map: &[Mapped]) -> TraceResult<f64> {
+        let at_new = |map: &[Mapped], f: fn(&Mapped) -> &Value| -> Vec<f64> {
+            map.iter().filter(|m| m.is_continuous).flat_map(|m| numbers(f(m))).collect()
+        };
+        let (from, to) = (at_new(map, |m| &m.old), at_new(map, |m| &m.new));
+        if from.len() != to.len() {
+            return Err(self.fault("what it gives has another number of coordinates".into()));
+        }
+        let n = from.len();
+        let mut matrix = DMatrix::<f64>::zeros(n, n);
+        for j in 0..n {
+            let h = 5e-4 * from[j].abs().max(1e-3);
+            // (f(x - 2h) - 8 f(x - h) + 8 f(x + h) - f(x + 2h)) / 12h
+            for (steps, weight) in [(-2.0, 1.0), (-1.0, -8.0), (1.0, 8.0), (2.0, -1.0)] {
+                let mut moved = from.clone();
+                moved[j] += steps * h;
+                let mut moved = moved.into_iter();
+                let place = |m: &Mapped| if m.is_continuous { with_numbers(&m.old, &mut moved) } else { m.old.clone() };
+                let values: Vec<Value> = map.iter().map(place).collect();
+                let choices: Vec<(Address, Value)> = map
+                    .iter()
+                    .zip(&values)
+                    .filter_map(|(m, v)| Some((m.choice.as_ref()?.0.clone(), v.clone())))
+                    .collect();
+                let auxiliaries = &values[choices.len()..];
+                let there = self.play(trace, at, Source::Given(auxiliaries), Some(&choices))?;
+                let image = at_new(&mapped(&there, trace), |m| &m.new);
+                if image.len() != n || there.drawn.len() != played.drawn.len() {
+                    return Err(self.fault("what it maps depends on numbers that it moves".into()));
+                }
+                for i in 0..n {
+                    matrix[(i, j)] += weight * image[i] / (12.0 * h);
+                }
+            }
+        }
+        let log = libm::log(matrix.determinant().abs());
+        if log.is_finite() { Ok(log) } else { Err(self.fault("its Jacobian is singular or no number".into())) }
+    }
+}
+
+/// Whether there is something in a value that is not a number.
+fn has_nan(x: &Datum) -> bool {
+    match x {
+        Datum::Num(x) => x.is_nan(),
+        Datum::Vec(xs) => xs.iter().any(|x| x.is_nan()),
+        Datum::List(xs) => xs.iter().any(has_nan),
+        Datum::Bool(_) => false,
+    }
+}

@@ -1,0 +1,105 @@
+//! What kernels of particles share: states drawn from the prior, and the acceptance of a whole state by estimates of the
+//! evidence (particle independent Metropolis-Hastings: Andrieu, Doucet & Holenstein 2010, section 2.4.2). Not here: how
+//! particles go from the prior to the posterior.
+
+use crate::infer::kernel::{At, Outcome, accepts};
+use crate::infer::selection::fail;
+use crate::lang::code::Observed;
+use crate::num::log_sum_exp;
+use crate::rng::Stream;
+use crate::syntax::span::Span;
+use crate::trace::{Constraint, Selector, Trace, TraceResult};
+use std::sync::Arc;
+
+/// Whole states, accepted with the ratio of the estimates of the evidence that they come with.
+pub(super) struct Independent {
+    kernel: &'static str,
+    /// Choices that are not drawn anew.
+    frozen: Selector,
+    span: Span,
+    /// The state that was accepted last: its log joint density and the log of the evidence's estimate.
+    accepted: Option<(f64, f64)>,
+    /// What was observed then.
+    observed: Option<Arc<Observed>>,
+    /// The logs of all estimates.
+    estimates: Vec<f64>,
+}
+
+impl Independent {
+    /// For a kernel of this name; `span` is where errors point.
+    pub fn new(kernel: &'static str, frozen: Selector, span: Span) -> Self {
+        Independent { kernel, frozen, span, accepted: None, observed: None, estimates: Vec::new() }
+    }
+
+    /// Begins a step; true if it is the first of all or the first under other data, whose estimates start anew.
+    ///
+    /// # Errors
+    /// If the state is not the one that was accepted last.
+    pub fn begin(&mut self, trace: &mut Trace, at: &At) -> TraceResult<bool> {
+        trace.rollback();
+        if !self.observed.as_ref().is_some_and(|o| Arc::ptr_eq(o, trace.replacements())) {
+            self.observed = Some(Arc::clone(trace.replacements()));
+            self.accepted = None;
+            self.estimates.clear();
+            return Ok(true);
+        }
+        if let Some((log_joint, _)) = self.accepted
+            && log_joint.to_bits() != trace.log_joint().to_bits()
+            && !at.adapting
+        {
+            let name = self.kernel;
+            let mut e = fail(self.span, format!("another kernel moved the state between two steps of {name}"));
+            e.hint = Some(format!(
+                "{name} draws whole states by itself; its estimate of the evidence belongs to the state it drew"
+            ));
+            return Err(e);
+        }
+        Ok(false)
+    }
+
+    /// Particles from the prior; what is frozen stays.
+    ///
+    /// # Errors
+    /// Those of the program.
+    pub fn draw(&self, trace: &mut Trace, particles: usize, at: &At) -> TraceResult<Vec<Trace>> {
+        let selection = trace.select(&self.frozen);
+        let fixed: Vec<(u64, Constraint)> = trace
+            .targets(selection)
+            .iter()
+            .filter_map(|t| Some((trace.address_hash(*t), Constraint::Stored(trace.stored(*t)?))))
+            .collect();
+        let one = |i: usize| trace.another(fixed.iter().cloned(), at.within(i as u64).draws(0));
+        (0..particles).map(one).collect()
+    }
+
+    /// Takes one of the particles as the new state, or stays.
+    pub fn decide(
+        &mut self,
+        trace: &mut Trace,
+        mut particles: Vec<Trace>,
+        log_evidence: f64,
+        rng: &mut Stream,
+    ) -> Outcome {
+        let one = rng.index(particles.len());
+        self.estimates.push(log_evidence);
+        let ratio = match self.accepted {
+            Some((_, old)) => log_evidence - old,
+            // The first state is a start like any other.
+            None if log_evidence > f64::NEG_INFINITY => 0.0,
+            None => f64::NEG_INFINITY,
+        };
+        let accepted = accepts(ratio, rng);
+        if accepted {
+            *trace = particles.swap_remove(one);
+            self.accepted = Some((trace.log_joint(), log_evidence));
+            self.observed = Some(Arc::clone(trace.replacements()));
+        }
+        Outcome::one(accepted)
+    }
+
+    /// The log of the mean of all estimates.
+    pub fn log_evidence(&self) -> Option<f64> {
+        let n = self.estimates.len();
+        (n > 0).then(|| log_sum_exp(&self.estimates) - libm::log(n as f64))
+    }
+}

@@ -1,0 +1,77 @@
+//! Kernels that keep a state, a distance or a second trace between steps: with other data they go over to those, and a surrogate
+//! saves evaluations of what it stands for.
+
+use pcadlang::Model;
+use pcadlang::infer::{Abc, At, Delayed, Drift, Kernel, Mh, Pick, Scope, Smc, Temper};
+use pcadlang::lang::value::Value;
+use pcadlang::syntax::span::Span;
+use pcadlang::trace::{Pattern, Selector, Trace};
+
+fn scope() -> Scope {
+    Scope { selector: Selector::All, pick: Pick::All }
+}
+
+/// The mean of `x` after the data have become 2, with steps before that under the program's own.
+fn under_new_data(kernel: &mut dyn Kernel, steps: u64) -> f64 {
+    let model = Model::from_text("assume x ~ normal(0, 1); observe normal(x, 1) = -3;").unwrap();
+    let mut trace: Trace = model.simulate(1, 0).unwrap();
+    for i in 0..50 {
+        kernel.step(&mut trace, &At::new(1, 0, i)).unwrap();
+    }
+    let hash = trace.observed()[0].hash;
+    trace.set_observed(&[(hash, Value::Num(2.0))]).unwrap();
+    trace.commit();
+    let (mut sum, skip) = (0.0, steps / 10);
+    for i in 0..skip + steps {
+        kernel.step(&mut trace, &At::new(1, 0, 50 + i)).unwrap();
+        assert!(trace.observed()[0].value.same(&Value::Num(2.0)));
+        if i >= skip {
+            let Value::Num(x) = trace.value(trace.all_targets()[0]) else { panic!("no number") };
+            sum += x;
+        }
+    }
+    sum / steps as f64
+}
+
+/// Kernels that keep states or distances between steps go over to other data with the trace.
+#[test]
+fn other_data_reach_what_is_kept() {
+    let walk = || -> Box<dyn Kernel> { Box::new(Drift::new(scope(), Some(1.0))) };
+    let mean = under_new_data(&mut Temper::new((0..3).map(|_| walk()).collect(), 0.1), 20_000);
+    assert!((mean - 1.0).abs() < 0.1, "temper: {mean}");
+    let mean = under_new_data(&mut Smc::new(walk(), 10, Selector::Nothing, Span::default()), 2000);
+    assert!((mean - 1.0).abs() < 0.1, "smc: {mean}");
+    let mean = under_new_data(&mut Abc::new(Box::new(Mh::new(scope())), 0.5, Span::default()), 60_000);
+    // Data drawn within 0.5 of 2 are 2 - 1 / 12 in the mean.
+    assert!((mean - 0.96).abs() < 0.08, "abc: {mean}");
+}
+
+/// The observation runs once for what the surrogate lets through, and not at all for the rest; with and without incremental
+/// updates the chain is the same.
+#[test]
+fn the_observation_is_evaluated_for_what_the_surrogate_accepts() {
+    let text = "assume x ~ normal(0, 3); let far = 1000 * sin(x / 1000);
+                observe normal(far, 0.3) = 2 with coarse = normal(x, 0.6) as y;";
+    let model = Model::from_text(text).unwrap();
+    let run = |incremental: bool| {
+        let mut trace = model.simulate(1, 0).unwrap();
+        trace.set_incremental(incremental);
+        let at = Selector::Address(Pattern::exact(&trace.observations()[0].0));
+        let inner = Box::new(Mh::new(scope()));
+        let mut kernel = Delayed::new(inner, at, Span::default());
+        kernel.step(&mut trace, &At::new(1, 0, 0)).unwrap();
+        trace.watch();
+        let (mut states, mut accepted) = (Vec::new(), 0);
+        for i in 1..2000 {
+            accepted += kernel.step(&mut trace, &At::new(1, 0, i)).unwrap().accepted;
+            states.push(trace.log_joint().to_bits());
+        }
+        let fine = &text[text.find("normal(far").unwrap()..];
+        let spans = trace.executed();
+        let evaluated = spans.iter().filter(|s| text[s.start as usize..].starts_with(fine)).count();
+        (states, accepted, evaluated)
+    };
+    let (states, accepted, evaluated) = run(true);
+    assert!(accepted > 100 && (accepted as usize..1000).contains(&evaluated), "{accepted}, {evaluated}");
+    assert_eq!(states, run(false).0);
+}
