@@ -22,6 +22,17 @@ pub struct Gibbs {
     peek: Peek,
 }
 
+/// The state that the values of a choice are weighed against.
+#[derive(Clone, Copy, Debug)]
+struct Present {
+    /// The index of the value there.
+    value: usize,
+    /// What picking the choice there costs.
+    ways: f64,
+    /// The lane of value `i` is `first_lane + i`.
+    first_lane: u64,
+}
+
 /// What weighing the values of a choice showed.
 #[derive(Clone, Copy, Debug, Default)]
 struct Weighed {
@@ -38,22 +49,19 @@ impl Gibbs {
         Gibbs { scope: Registered::new(scope.single()), values: Vec::new(), log: Vec::new(), peek: Peek::default() }
     }
 
-    /// The log weights of all values relative to the state, which has value `current`; picking the choice there costs `ways`.
-    /// The lane of value `i` is `first_lane + i`.
+    /// The log weights of all values relative to the present state.
     fn weigh(
         &mut self,
         trace: &mut Trace,
         at: &At,
         target: Target,
         dist: &Dist,
-        ways: f64,
-        current: usize,
-        first_lane: u64,
+        present: Present,
     ) -> TraceResult<Weighed> {
         let mut weighed = Weighed::default();
         let log = &mut self.log;
         log.clear();
-        let by_peek = trace.weigh_values(target, dist, &self.values, current, &mut self.peek, |w| {
+        let by_peek = trace.weigh_values(target, dist, &self.values, present.value, &mut self.peek, |w| {
             weighed.failed += u32::from(w.is_none());
             let weight = w.map_or(f64::NEG_INFINITY, |w| at.tempered(&w));
             log.push(if weight.is_nan() { f64::NEG_INFINITY } else { weight });
@@ -64,14 +72,14 @@ impl Gibbs {
         self.log.clear();
         weighed.failed = 0;
         for (i, v) in self.values.iter().enumerate() {
-            if i == current {
+            if i == present.value {
                 self.log.push(0.0);
                 continue;
             }
             let change = [(target, Change::Set(v.clone()))];
-            match recoverable(trace.propose(&change, at.draws(first_lane + i as u64)))? {
+            match recoverable(trace.propose(&change, at.draws(present.first_lane + i as u64)))? {
                 Some(w) => {
-                    let log = at.tempered(&w) + (ways - self.scope.ways_back(trace));
+                    let log = at.tempered(&w) + (present.ways - self.scope.ways_back(trace));
                     self.log.push(if log.is_nan() { f64::NEG_INFINITY } else { log });
                     weighed.structural |= w.appeared > 0 || w.vanished > 0;
                     weighed.pending = Some(i);
@@ -106,7 +114,8 @@ impl Kernel for Gibbs {
         let Some(old) = self.values.iter().position(|v| Some(v) == stored.as_ref()) else {
             return Ok(Outcome::default());
         };
-        let forward = self.weigh(trace, at, target, &dist, libm::log(n as f64), old, 0)?;
+        let here = Present { value: old, ways: libm::log(n as f64), first_lane: 0 };
+        let forward = self.weigh(trace, at, target, &dist, here)?;
         let chosen = sample_log(&self.log, &mut rng);
         let mut outcome = Outcome { proposals: 1, failed: forward.failed, ..Default::default() }.at(target);
         if chosen == old {
@@ -133,7 +142,8 @@ impl Kernel for Gibbs {
         let removed = trace.removed();
         trace.commit();
         let ways = self.scope.ways_back(trace);
-        self.weigh(trace, at, target, &dist, ways, chosen, self.values.len() as u64)?;
+        let there = Present { value: chosen, ways, first_lane: self.values.len() as u64 };
+        self.weigh(trace, at, target, &dist, there)?;
         trace.rollback();
         // The old state itself stands for the old value: its weight back is minus its weight forth.
         self.log[old] = -forth;
