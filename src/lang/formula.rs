@@ -67,9 +67,9 @@ pub struct Formula {
     pub computations: Box<[Slot]>,
     /// In which registers they are left, if they are computed.
     pub results: Box<[(Slot, u8)]>,
-    /// What the alternatives of its selections hold, and how often at most: who else holds it keeps it when a selection
-    /// takes the other alternative.
-    pub held: Box<[(Operand, u32)]>,
+    /// What the alternatives of its selections hold: the selection, whether it is the first alternative, an operand. Who else
+    /// holds it keeps it when the selection takes the other alternative.
+    pub held: Box<[(Slot, bool, Operand)]>,
     /// The computations of the alternatives; they must hold nothing besides their operands.
     pub computed: Box<[Slot]>,
 }
@@ -119,7 +119,7 @@ struct Compiler<'a> {
     /// Whether the next step is inside an alternative: what it reads may not be evaluated.
     inside: bool,
     results: Vec<(Slot, u8)>,
-    held: Vec<(Operand, u32)>,
+    held: Vec<(Slot, bool, Operand)>,
     computed: Vec<Slot>,
 }
 
@@ -237,8 +237,8 @@ impl Compiler<'_> {
                 self.alternative(otherwise, into)?;
                 self.land(go);
                 if chosen {
-                    self.hold(then)?;
-                    self.hold(otherwise)?;
+                    self.hold(slot, true, then)?;
+                    self.hold(slot, false, otherwise)?;
                 }
                 Some(into)
             }
@@ -254,25 +254,22 @@ impl Compiler<'_> {
         Some(())
     }
 
-    /// Notes what an alternative holds.
-    fn hold(&mut self, o: Operand) -> Option<()> {
+    /// Notes what an alternative of a selection holds.
+    fn hold(&mut self, selection: Slot, first: bool, o: Operand) -> Option<()> {
         let inner = match o {
             Operand::Const(_) => return Some(()),
             Operand::Local(s) => self.computation(s),
             Operand::Outer { .. } => None,
         };
         let Some((slot, inner)) = inner else {
-            match self.held.iter_mut().find(|(other, _)| *other == o) {
-                Some((_, times)) => *times += 1,
-                None => self.held.push((o, 1)),
-            }
-            return Some(());
+            self.held.push((selection, first, o));
+            return (self.held.len() <= LONGEST).then_some(());
         };
         self.computed.push(slot);
         if self.computed.len() > LONGEST {
             return None;
         }
-        inner.into_iter().try_for_each(|o| self.hold(o))
+        inner.into_iter().try_for_each(|o| self.hold(selection, first, o))
     }
 
     /// A slot that only computes, and its operands.

@@ -33,7 +33,7 @@ fn quantised(x: f64) -> i128 {
     let rest = (x - whole as f64) * HALF;
     let upper = rest as i64;
     let lower = ((rest - upper as f64) * HALF) as i64;
-    (i128::from(whole) << 64) + i128::from((upper << 32) + lower)
+    (i128::from(whole) << 64) + (i128::from(upper) << 32) + i128::from(lower)
 }
 
 impl ExactSum {

@@ -259,13 +259,18 @@ impl<'a> Evaluation<'a, REGISTERS> {
 
     /// Whether its selections can take their other alternatives without letting anything go but computations.
     fn can_choose(&self, formula: &Formula) -> bool {
-        let is_held = |(o, times): &(Operand, u32)| {
-            let Some(n) = self.graph.resolve(self.frame(), *o) else { return true };
+        let is_taken = |slot: Slot, first: bool| {
+            let node = self.node(slot);
+            node.state == State::Clean && first == (node.flags & OTHERWISE == 0)
+        };
+        let held = formula.held.iter().filter(|(slot, first, _)| is_taken(*slot, *first)).map(|(_, _, o)| *o);
+        let is_held = |o: Operand| {
+            let Some(n) = self.graph.resolve(self.frame(), o) else { return true };
             let node = &self.graph.nodes[n as usize];
             let holds_nothing = matches!(self.graph.op(self.code, n), Op::Item) && node.side.is_none();
-            node.state != State::Clean || node.refs > *times || holds_nothing
+            holds_nothing || node.refs as usize > held.clone().filter(|other| *other == o).count()
         };
-        formula.computed.iter().all(|slot| self.node(*slot).side.is_none()) && formula.held.iter().all(is_held)
+        formula.computed.iter().all(|slot| self.node(*slot).side.is_none()) && held.clone().all(is_held)
     }
 
     /// The log density of a single number or truth value.

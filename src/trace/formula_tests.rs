@@ -1,7 +1,6 @@
 //! Formulas against updates: the same weights and the same states, to the last bit, or no answer.
 
 use super::*;
-use crate::infer::{At, Gibbs, Kernel, Pick, Scope};
 use crate::trace::{Change, Draws, Selector, Target, Trace};
 use crate::{Model, Program};
 
@@ -9,14 +8,16 @@ fn model(text: &str) -> Model {
     Program::parse(text).unwrap().compile().unwrap()
 }
 
-/// How many weights and moves formulas gave, over the states that a chain visits; all are compared with updates.
+/// How many weights and moves formulas gave, over states of a walk through the prior; all are compared with updates.
 fn compared(text: &str) -> [usize; 2] {
     let mut trace = model(text).simulate(1, 0).unwrap();
     let every = Selector::Tag { name: "d".into(), value: None };
-    let mut kernel = Gibbs::new(Scope { selector: every.clone(), pick: Pick::One });
     let (mut weights, mut moves) = (0, 0);
     for step in 0..60 {
-        kernel.step(&mut trace, &At::new(1, 0, step)).unwrap();
+        let all = trace.all_targets();
+        let one = all[step as usize % all.len()];
+        trace.regenerate(&[one], Draws { step, ..Draws::default() }).unwrap();
+        trace.commit();
         let selection = trace.select(&every);
         for t in trace.targets(selection).to_vec() {
             let dist = trace.dist(t).unwrap();
@@ -86,7 +87,7 @@ fn states_of_a_chain() {
 fn conditions_and_arithmetic() {
     let [weights, moves] = compared(
         "let w = [0.2, 0.5, 0.3]; assume k ~ categorical(w) #d; assume b ~ flip(0.4) #d;
-         let u = if k * 2 > 1 { sqrt(k + 3) } else { -k }; let v = if !b { 1 } else { 2 };
+         let u = if k * 2 > 1 { sqrt(k + 3) } else { -k }; let v = if not b { 1 } else { 2 };
          factor log(1 + k ** 2); observe normal(u, v) = 0.7; assume n ~ binomial(4, 0.3 + k / 10) #d; observe poisson(n + 1) = 3;",
     );
     assert!(weights > 300 && moves > 150, "{weights} {moves}");
