@@ -50,7 +50,7 @@ struct Evaluation<'a, const N: usize> {
     /// Whether a selection took its other alternative.
     chose: bool,
     /// The scores, by node.
-    scores: SmallVec<[(NodeId, f64); 4]>,
+    scores: SmallVec<[(NodeId, f64); 8]>,
     prior: ExactSum,
     likelihood: ExactSum,
 }
@@ -123,7 +123,7 @@ impl Graph {
     pub fn assign(&mut self, code: &Code, target: NodeId, dist: &Dist, value: &Datum) -> bool {
         let Some(formulas) = self.formulas(code, target) else { return false };
         let Some(at) = Register::of_datum(value) else { return false };
-        let mut values: SmallVec<[(NodeId, Value); 4]> = SmallVec::new();
+        let mut values: SmallVec<[(NodeId, Value); 16]> = SmallVec::new();
         let mut e = Evaluation::new(self, code, [at; REGISTERS]);
         for placed in &formulas {
             if e.run(placed, formulas.len() == 1).is_none() || e.chose {

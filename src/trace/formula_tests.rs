@@ -88,7 +88,7 @@ fn conditions_and_arithmetic() {
     let [weights, moves] = compared(
         "let w = [0.2, 0.5, 0.3]; assume k ~ categorical(w) #d; assume b ~ flip(0.4) #d;
          let u = if k * 2 > 1 { sqrt(k + 3) } else { -k }; let v = if not b { 1 } else { 2 };
-         factor log(1 + k ** 2); observe normal(u, v) = 0.7; assume n ~ binomial(4, 0.3 + k / 10) #d; observe poisson(n + 1) = 3;",
+         factor(log(1 + k ** 2)); observe normal(u, v) = 0.7; assume n ~ binomial(4, 0.3 + k / 10) #d; observe poisson(n + 1) = 3;",
     );
     assert!(weights > 300 && moves > 150, "{weights} {moves}");
 }
