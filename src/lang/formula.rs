@@ -58,6 +58,19 @@ pub enum Step {
     Factor { slot: Slot, weight: Source },
 }
 
+/// Something that an alternative of a selection holds.
+#[derive(Clone, Copy, Debug)]
+pub struct Held {
+    /// The selection.
+    pub selection: Slot,
+    /// Whether it is the first alternative.
+    pub first: bool,
+    /// What is held.
+    pub operand: Operand,
+    /// How often all alternatives together do.
+    pub times: u32,
+}
+
 /// The scores of a block as a function of the value of one slot.
 #[derive(Clone, Debug, Default)]
 pub struct Formula {
@@ -65,11 +78,12 @@ pub struct Formula {
     pub steps: Box<[Step]>,
     /// The computations that depend on the value; they must not be read from other blocks.
     pub computations: Box<[Slot]>,
+    /// Whether a selection depends on the value.
+    pub chooses: bool,
     /// In which registers they are left, if they are computed.
     pub results: Box<[(Slot, u8)]>,
-    /// What the alternatives of its selections hold: the selection, whether it is the first alternative, an operand. Who else
-    /// holds it keeps it when the selection takes the other alternative.
-    pub held: Box<[(Slot, bool, Operand)]>,
+    /// What the alternatives of its selections hold: who else holds it keeps it when a selection takes the other alternative.
+    pub held: Box<[Held]>,
     /// The computations of the alternatives; they must hold nothing besides their operands.
     pub computed: Box<[Slot]>,
 }
@@ -87,6 +101,7 @@ impl Formula {
             known: vec![None; ops.len()],
             registers: 1,
             inside: false,
+            chooses: false,
             results: Vec::new(),
             held: Vec::new(),
             computed: Vec::new(),
@@ -95,10 +110,13 @@ impl Formula {
         let is_score = |s: &Slot| matches!(ops[*s as usize], Op::Draw { .. } | Op::Observe { .. } | Op::Factor { .. });
         let (scores, computations): (Vec<Slot>, Vec<Slot>) = dependents.into_iter().partition(is_score);
         scores.into_iter().try_for_each(|slot| compiler.score(slot))?;
-        let Compiler { steps, results, held, computed, .. } = compiler;
+        let Compiler { steps, chooses, results, mut held, computed, .. } = compiler;
+        let operands: Vec<Operand> = held.iter().map(|h| h.operand).collect();
+        held.iter_mut().for_each(|h| h.times = operands.iter().filter(|o| **o == h.operand).count() as u32);
         Some(Formula {
             steps: steps.into(),
             computations: computations.into(),
+            chooses,
             results: results.into(),
             held: held.into(),
             computed: computed.into(),
@@ -118,8 +136,9 @@ struct Compiler<'a> {
     registers: usize,
     /// Whether the next step is inside an alternative: what it reads may not be evaluated.
     inside: bool,
+    chooses: bool,
     results: Vec<(Slot, u8)>,
-    held: Vec<(Slot, bool, Operand)>,
+    held: Vec<Held>,
     computed: Vec<Slot>,
 }
 
@@ -236,6 +255,7 @@ impl Compiler<'_> {
                 self.land(branch);
                 self.alternative(otherwise, into)?;
                 self.land(go);
+                self.chooses |= chosen;
                 if chosen {
                     self.hold(slot, true, then)?;
                     self.hold(slot, false, otherwise)?;
@@ -262,7 +282,7 @@ impl Compiler<'_> {
             Operand::Outer { .. } => None,
         };
         let Some((slot, inner)) = inner else {
-            self.held.push((selection, first, o));
+            self.held.push(Held { selection, first, operand: o, times: 1 });
             return (self.held.len() <= LONGEST).then_some(());
         };
         self.computed.push(slot);

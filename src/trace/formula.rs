@@ -9,7 +9,7 @@ use super::propose::Weight;
 use crate::dist::{Datum, Dist};
 use crate::lang::builtins::{Args, Builtin, Kind, Scalar};
 use crate::lang::code::{Code, DistSpec, Op, Operand, Slot};
-use crate::lang::formula::{Formula, PARAMETERS, REGISTERS, Source, Step};
+use crate::lang::formula::{Formula, Held, PARAMETERS, REGISTERS, Source, Step};
 use crate::lang::index::place;
 use crate::lang::value::Value;
 use crate::num::ExactSum;
@@ -40,7 +40,7 @@ enum Register<'a> {
 }
 
 /// A formula at work on the nodes of one frame.
-struct Evaluation<'a, const N: usize> {
+pub(crate) struct Evaluation<'a, const N: usize> {
     graph: &'a Graph,
     code: &'a Code,
     base: NodeId,
@@ -102,20 +102,9 @@ impl Graph {
         Some(())
     }
 
-    /// The weight of a value of the choice, relative to the present one; `None` if the formulas do not cover it.
-    pub fn weigh(
-        &self,
-        code: &Code,
-        target: NodeId,
-        formulas: &Formulas,
-        dist: &Dist,
-        value: &Datum,
-    ) -> Option<Weight> {
-        let mut e = Evaluation::new(self, code, [Register::of_datum(value)?; REGISTERS]);
-        e.prior.sub(self.nodes[target as usize].score);
-        e.prior.add(dist.log_density_stored(value));
-        formulas.iter().try_for_each(|placed| e.run(placed, formulas.len() == 1))?;
-        Some(Weight::beside(&e.prior, &e.likelihood))
+    /// Formulas at work, for [`Evaluation::weigh`].
+    pub fn evaluation<'a>(&'a self, code: &'a Code) -> Evaluation<'a, REGISTERS> {
+        Evaluation::new(self, code, [Register::Num(0.0); REGISTERS])
     }
 
     /// Gives the choice another value for good, where formulas cover all that follows and nothing is held or let go; false,
@@ -123,8 +112,13 @@ impl Graph {
     pub fn assign(&mut self, code: &Code, target: NodeId, dist: &Dist, value: &Datum) -> bool {
         let Some(formulas) = self.formulas(code, target) else { return false };
         let Some(at) = Register::of_datum(value) else { return false };
+        // A truth value that a selection depends on nearly always makes it take the other alternative.
+        if matches!(at, Register::Bool(_)) && formulas.iter().any(|placed| placed.formula.chooses) {
+            return false;
+        }
         let mut values: SmallVec<[(NodeId, Value); 16]> = SmallVec::new();
-        let mut e = Evaluation::new(self, code, [at; REGISTERS]);
+        let mut e = self.evaluation(code);
+        e.begin(at);
         for placed in &formulas {
             if e.run(placed, formulas.len() == 1).is_none() || e.chose {
                 return false;
@@ -177,6 +171,24 @@ impl Graph {
 }
 
 impl<'a> Evaluation<'a, REGISTERS> {
+    /// The weight of a value of the choice, relative to the present one; `None` if the formulas do not cover it.
+    pub fn weigh(&mut self, target: NodeId, formulas: &Formulas, dist: &Dist, value: &Datum) -> Option<Weight> {
+        self.begin(Register::of_datum(value)?);
+        self.prior.sub(self.graph.nodes[target as usize].score);
+        self.prior.add(dist.log_density_stored(value));
+        formulas.iter().try_for_each(|placed| self.run(placed, formulas.len() == 1))?;
+        Some(Weight::beside(&self.prior, &self.likelihood))
+    }
+
+    /// Begins with a value of the choice.
+    fn begin(&mut self, value: Register<'a>) {
+        self.registers[0] = value;
+        self.chose = false;
+        self.scores.clear();
+        self.prior = ExactSum::default();
+        self.likelihood = ExactSum::default();
+    }
+
     /// Runs a formula. `may_choose`: selections may take their other alternative.
     fn run(&mut self, placed: &Placed, may_choose: bool) -> Option<()> {
         let formula = placed.formula;
@@ -259,18 +271,21 @@ impl<'a> Evaluation<'a, REGISTERS> {
 
     /// Whether its selections can take their other alternatives without letting anything go but computations.
     fn can_choose(&self, formula: &Formula) -> bool {
-        let is_taken = |slot: Slot, first: bool| {
-            let node = self.node(slot);
-            node.state == State::Clean && first == (node.flags & OTHERWISE == 0)
+        let is_taken = |h: &Held| {
+            let node = self.node(h.selection);
+            node.state == State::Clean && h.first == (node.flags & OTHERWISE == 0)
         };
-        let held = formula.held.iter().filter(|(slot, first, _)| is_taken(*slot, *first)).map(|(_, _, o)| *o);
-        let is_held = |o: Operand| {
-            let Some(n) = self.graph.resolve(self.frame(), o) else { return true };
+        let is_kept = |h: &Held| {
+            let Some(n) = self.graph.resolve(self.frame(), h.operand) else { return true };
             let node = &self.graph.nodes[n as usize];
+            if node.refs > h.times || !is_taken(h) {
+                return true;
+            }
+            let now = formula.held.iter().filter(|other| other.operand == h.operand && is_taken(other)).count();
             let holds_nothing = matches!(self.graph.op(self.code, n), Op::Item) && node.side.is_none();
-            holds_nothing || node.refs as usize > held.clone().filter(|other| *other == o).count()
+            node.refs as usize > now || holds_nothing
         };
-        formula.computed.iter().all(|slot| self.node(*slot).side.is_none()) && held.clone().all(is_held)
+        formula.computed.iter().all(|slot| self.node(*slot).side.is_none()) && formula.held.iter().all(is_kept)
     }
 
     /// The log density of a single number or truth value.

@@ -43,7 +43,6 @@ use graph::Graph;
 use journal::Before;
 pub(crate) use marginal::Sums;
 use node::{NONE, State};
-use peek::Obstacle;
 pub(crate) use peek::Peek;
 use std::sync::Arc;
 
@@ -182,53 +181,6 @@ impl Trace {
                 Err(e)
             }
         }
-    }
-
-    /// The weights that the values of a choice with this distribution would have in an update, each relative to the present state (that of the
-    /// `current` one is 0); `None` for values that the program does not have. False if that takes updates, since structure depends on the choice.
-    pub(crate) fn weigh_values(
-        &self,
-        target: Target,
-        dist: &Dist,
-        values: &[Datum],
-        current: usize,
-        peek: &mut Peek,
-        mut weight: impl FnMut(Option<Weight>),
-    ) -> TraceResult<bool> {
-        let g = &self.graph;
-        if self.update.is_some() || target.element != NONE {
-            return Ok(false);
-        }
-        let formulas = g.formulas(&self.code, target.node);
-        let mut peeked = false;
-        for (i, v) in values.iter().enumerate() {
-            if i == current {
-                weight(Some(Weight::default()));
-                continue;
-            }
-            if let Some(f) = &formulas
-                && let Some(w) = g.weigh(&self.code, target.node, f, dist, v)
-            {
-                weight(Some(w));
-                continue;
-            }
-            if !peeked && !g.peek_at(&self.code, target.node, peek) {
-                return Ok(false);
-            }
-            peeked = true;
-            match g.peek(&self.code, peek, dist, v) {
-                Ok(w) => weight(Some(w)),
-                Err(Obstacle::Fault(e)) if e.is_recoverable() => weight(None),
-                Err(_) => return Ok(false),
-            }
-        }
-        Ok(true)
-    }
-
-    /// Gives a choice with this distribution another value for good, where that changes no structure and can be done in short;
-    /// false, and nothing is done, otherwise: then an update does it.
-    pub(crate) fn assign(&mut self, target: Target, dist: &Dist, value: &Datum) -> bool {
-        self.update.is_none() && target.element == NONE && self.graph.assign(&self.code, target.node, dist, value)
     }
 
     /// Draws the targets anew from the prior, together.

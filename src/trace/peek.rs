@@ -5,11 +5,13 @@
 //! or rolled back. Terms are quantised as in an update, so the weights are the same to the last bit. What would change
 //! structure, or is of a kind not handled here, is left to an update.
 
+use super::choices::Target;
 use super::demand::Failure;
 use super::eval::{Score, apply};
 use super::graph::Graph;
 use super::node::*;
 use super::propose::Weight;
+use super::{Trace, TraceResult};
 use crate::dist::{Datum, Dist};
 use crate::lang::code::{Code, DistSpec, Op, Operand};
 use crate::lang::index::index_value;
@@ -46,6 +48,56 @@ pub(crate) enum Obstacle {
 impl From<Failure> for Obstacle {
     fn from(e: Failure) -> Self {
         Obstacle::Fault(e)
+    }
+}
+
+impl Trace {
+    /// The weights that the values of a choice with this distribution would have in an update, each relative to the present state (that of the
+    /// `current` one is 0); `None` for values that the program does not have. False if that takes updates, since structure depends on the choice.
+    pub(crate) fn weigh_values(
+        &self,
+        target: Target,
+        dist: &Dist,
+        values: &[Datum],
+        current: usize,
+        peek: &mut Peek,
+        mut weight: impl FnMut(Option<Weight>),
+    ) -> TraceResult<bool> {
+        let g = &self.graph;
+        if self.update.is_some() || target.element != NONE {
+            return Ok(false);
+        }
+        let formulas = g.formulas(&self.code, target.node);
+        let mut evaluation = g.evaluation(&self.code);
+        let mut peeked = false;
+        for (i, v) in values.iter().enumerate() {
+            if i == current {
+                weight(Some(Weight::default()));
+                continue;
+            }
+            if let Some(f) = &formulas
+                && let Some(w) = evaluation.weigh(target.node, f, dist, v)
+            {
+                weight(Some(w));
+                continue;
+            }
+            if !peeked && !g.peek_at(&self.code, target.node, peek) {
+                return Ok(false);
+            }
+            peeked = true;
+            match g.peek(&self.code, peek, dist, v) {
+                Ok(w) => weight(Some(w)),
+                Err(Obstacle::Fault(e)) if e.is_recoverable() => weight(None),
+                Err(_) => return Ok(false),
+            }
+        }
+        Ok(true)
+    }
+
+    /// Gives a choice with this distribution another value for good, where that changes no structure and can be done in short;
+    /// false, and nothing is done, otherwise: then an update does it.
+    pub(crate) fn assign(&mut self, target: Target, dist: &Dist, value: &Datum) -> bool {
+        self.update.is_none() && target.element == NONE && self.graph.assign(&self.code, target.node, dist, value)
     }
 }
 

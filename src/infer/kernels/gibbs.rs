@@ -10,15 +10,16 @@ use crate::infer::kernel::{At, Kernel, Outcome, Registered, Scope, accepts, reco
 use crate::num::log_sum_exp;
 use crate::rng::Stream;
 use crate::trace::{Change, Peek, Target, Trace, TraceResult};
-use smallvec::SmallVec;
 
 /// `gibbs(sel)`: draws one choice from its distribution given all else.
 #[derive(Clone, Debug)]
 pub struct Gibbs {
     scope: Registered,
-    /// The values of the choice and their log weights, kept from step to step so that nothing is allocated.
+    /// The values of the choice, their log weights, those relative to the largest: kept from step to step so that nothing is
+    /// allocated.
     values: Vec<Datum>,
     log: Vec<f64>,
+    weights: Vec<f64>,
     peek: Peek,
 }
 
@@ -46,7 +47,8 @@ struct Weighed {
 impl Gibbs {
     /// The kernel for one of these choices at a time.
     pub fn new(scope: Scope) -> Self {
-        Gibbs { scope: Registered::new(scope.single()), values: Vec::new(), log: Vec::new(), peek: Peek::default() }
+        let scope = Registered::new(scope.single());
+        Gibbs { scope, values: Vec::new(), log: Vec::new(), weights: Vec::new(), peek: Peek::default() }
     }
 
     /// The log weights of all values relative to the present state.
@@ -116,7 +118,7 @@ impl Kernel for Gibbs {
         };
         let here = Present { value: old, ways: libm::log(n as f64), first_lane: 0 };
         let forward = self.weigh(trace, at, target, &dist, here)?;
-        let chosen = sample_log(&self.log, &mut rng);
+        let chosen = sample_log(&self.log, &mut self.weights, &mut rng);
         let mut outcome = Outcome { proposals: 1, failed: forward.failed, ..Default::default() }.at(target);
         if chosen == old {
             trace.rollback();
@@ -159,9 +161,10 @@ impl Kernel for Gibbs {
 }
 
 /// An index with probability proportional to exp(log[i]), of which at least one is not zero.
-fn sample_log(log: &[f64], rng: &mut Stream) -> usize {
+fn sample_log(log: &[f64], weights: &mut Vec<f64>, rng: &mut Stream) -> usize {
     let max = log.iter().copied().fold(f64::NEG_INFINITY, f64::max);
-    let weights: SmallVec<[f64; 16]> = log.iter().map(|l| if *l == max { 1.0 } else { libm::exp(l - max) }).collect();
+    weights.clear();
+    weights.extend(log.iter().map(|l| if *l == max { 1.0 } else { libm::exp(l - max) }));
     let mut u = rng.uniform() * weights.iter().sum::<f64>();
     let mut last = 0;
     for (i, p) in weights.iter().enumerate().filter(|(_, p)| **p > 0.0) {
