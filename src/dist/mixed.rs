@@ -5,6 +5,9 @@ use super::{Batch, Categorical, Dist, Mixture};
 use crate::num::{Column, ExactSum};
 use smallvec::SmallVec;
 
+/// A component: its family, and where its parameters are.
+type Part = (Box<dyn Family>, SmallVec<[Column; 3]>);
+
 /// A mixture of components over numbers.
 #[derive(Debug)]
 struct Mixed {
@@ -13,7 +16,7 @@ struct Mixed {
     weights: Vec<f64>,
     log_shares: Vec<f64>,
     total: f64,
-    parts: Vec<(Box<dyn Family>, SmallVec<[Column; 3]>)>,
+    parts: Vec<Part>,
 }
 
 /// The batch of a mixture whose weights, and the parameters of whose components, lie in these columns or stay. `None` where a

@@ -208,7 +208,7 @@ mod tests {
     fn what_is_printed_reads_back() {
         let key = |s: &str| Key::Str(s.into());
         let number = |x: f64| Key::Num(x.to_bits());
-        let keys = vec![
+        let keys = [
             vec![],
             vec![number(17.0), number(-2.5)],
             vec![number(1e300), number(f64::INFINITY)],
