@@ -39,7 +39,7 @@ pub struct Unary {
     pub slope: fn(f64, f64) -> f64,
 }
 
-/// A function of two numbers, also in loops over numbers in a buffer (see [`binary_form`]).
+/// A function of two numbers, also in loops over numbers in a buffer (see `binary_form`).
 #[derive(Debug)]
 pub struct Binary {
     /// dz/dx and dz/dy, of x, y and z.
