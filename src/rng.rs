@@ -117,6 +117,21 @@ impl Stream {
         (product >> 64) as usize
     }
 
+    /// The place of one of these weights, with probability in proportion to it; `total` is their sum, and weights of 0 are
+    /// never chosen but for the last where there is nothing else.
+    #[inline]
+    pub fn weighted(&mut self, weights: &[f64], total: f64) -> usize {
+        let (mut u, mut last) = (self.uniform() * total, weights.len().saturating_sub(1));
+        for (i, w) in weights.iter().enumerate().filter(|(_, w)| **w > 0.0) {
+            last = i;
+            if u < *w {
+                break;
+            }
+            u -= w;
+        }
+        last
+    }
+
     /// A draw from one of `rand_distr`'s distributions.
     pub fn sample<T>(&mut self, d: impl rand_distr::Distribution<T>) -> T {
         d.sample(self)

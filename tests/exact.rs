@@ -11,7 +11,12 @@ fn conjugate_normal(kernel: &str) {
         "assume x ~ normal(0, 1); observe normal(x, 0.5) = 2;
          infer {{ warmup 2000 {{ {stmt} }} repeat 60000 {{ {stmt} collect x; }} }}"
     );
-    let d = run(&text, 1, 2);
+    assert_conjugate(kernel, &text);
+}
+
+/// Draws of x have the mean and variance of that posterior.
+fn assert_conjugate(kernel: &str, text: &str) {
+    let d = run(text, 1, 2);
     assert_mean(kernel, &d["x"], 1.6, 0.06);
     let squares: Vec<f64> = d["x"].iter().map(|x| (x - 1.6) * (x - 1.6)).collect();
     assert_mean(&format!("{kernel}, variance"), &squares, 0.2, 0.03);
@@ -68,10 +73,7 @@ fn surrogates_leave_the_posterior_as_it_is() {
              kernel pull(s) {{ let here = value(@x); propose @x ~ normal(0.7 * here + 1, s); }}
              infer {{ warmup 2000 {{ {kernel}; }} repeat 60000 {{ {kernel}; collect x; }} }}"
         );
-        let d = run(&text, 1, 2);
-        assert_mean(kernel, &d["x"], 1.6, 0.06);
-        let squares: Vec<f64> = d["x"].iter().map(|x| (x - 1.6) * (x - 1.6)).collect();
-        assert_mean(&format!("{kernel}, variance"), &squares, 0.2, 0.03);
+        assert_conjugate(kernel, &text);
     }
 }
 

@@ -67,16 +67,7 @@ impl Scalar for Categorical {
     }
 
     fn draw(&self, rng: &mut Stream) -> f64 {
-        let mut u = rng.uniform() * self.total;
-        let mut last = 0;
-        for (i, w) in self.weights.iter().enumerate().filter(|(_, w)| **w > 0.0) {
-            last = i;
-            if u < *w {
-                break;
-            }
-            u -= w;
-        }
-        last as f64
+        rng.weighted(&self.weights, self.total) as f64
     }
 
     #[inline]

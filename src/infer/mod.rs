@@ -27,7 +27,8 @@ pub(crate) use init::attempts;
 pub use init::{Start, StartError, starts};
 pub use kernel::{At, Kernel, Outcome, Pick, Scope};
 pub use kernels::{
-    Abc, AbcSmc, Block, Delayed, Drift, Elliptical, Gibbs, Hmc, Knn, Mh, Nuts, Optimize, Slice, Smc, Temper,
+    Abc, AbcSmc, Block, Delayed, Drift, Elliptical, Gibbs, Hamiltonian, Hmc, Independent, Knn, Mh, Nuts, Optimize,
+    Slice, Smc, Temper,
 };
 pub use neighbours::{Banks, Latent, Latents, Neighbours};
 pub(crate) use parallel::in_parallel;

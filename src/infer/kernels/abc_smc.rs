@@ -8,8 +8,8 @@
 //! are found in the first run, so that half of the particles are kept at each, and stay as they are.
 
 use super::abc::{simulate, step_within};
-use super::particles::Independent;
-use crate::infer::kernel::{At, Kernel, Outcome};
+use super::particles::{Independent, Prior, Way};
+use crate::infer::kernel::{At, Kernel};
 use crate::infer::resampling::systematic;
 use crate::syntax::span::Span;
 use crate::trace::{Selector, Trace, TraceResult};
@@ -18,7 +18,10 @@ use crate::trace::{Selector, Trace, TraceResult};
 const MOST: usize = 1000;
 
 /// Particle independent Metropolis-Hastings without likelihoods.
-pub struct AbcSmc {
+pub type AbcSmc = Independent<Closer>;
+
+/// The distance that data may have falls to `eps`.
+pub struct Closer {
     kernel: Box<dyn Kernel>,
     eps: f64,
     particles: usize,
@@ -27,7 +30,6 @@ pub struct AbcSmc {
     span: Span,
     /// Falling, the last one `eps`; found in the first run.
     tolerances: Vec<f64>,
-    states: Independent,
 }
 
 impl AbcSmc {
@@ -40,13 +42,22 @@ impl AbcSmc {
         frozen: Selector,
         span: Span,
     ) -> Self {
-        let states = Independent::new("abc", frozen, span);
-        AbcSmc { kernel, eps, particles, moves, span, tolerances: Vec::new(), states }
+        let way = Closer { kernel, eps, particles, moves, span, tolerances: Vec::new() };
+        Independent::by(way, frozen, span)
+    }
+}
+
+impl Way for Closer {
+    fn name(&self) -> &'static str {
+        "abc"
     }
 
-    /// Lowers the tolerance to `eps`; gives the particles and the log of the estimate.
-    fn run(&mut self, trace: &mut Trace, at: &At) -> TraceResult<(Vec<Trace>, f64)> {
-        let mut particles = self.states.draw(trace, self.particles, at)?;
+    fn forget(&mut self) {
+        self.tolerances.clear();
+    }
+
+    fn lead(&mut self, prior: &Prior, trace: &mut Trace, at: &At) -> TraceResult<(Vec<Trace>, f64)> {
+        let mut particles = prior.draw(trace, self.particles, at)?;
         let mut distances = Vec::with_capacity(particles.len());
         for (i, p) in particles.iter().enumerate() {
             distances.push(simulate(p, at.within(i as u64).draws(1), self.span)?);
@@ -90,22 +101,4 @@ fn next_tolerance(distances: &[f64], present: f64) -> f64 {
     sorted.sort_by(f64::total_cmp);
     let half = &sorted[..sorted.len().div_ceil(2)];
     half.iter().rev().find(|d| **d < present).copied().unwrap_or(0.0)
-}
-
-impl Kernel for AbcSmc {
-    fn name(&self) -> String {
-        "abc".into()
-    }
-
-    fn step(&mut self, trace: &mut Trace, at: &At) -> TraceResult<Outcome> {
-        if self.states.begin(trace, at)? {
-            self.tolerances.clear();
-        }
-        let (particles, log_kept) = self.run(trace, at)?;
-        Ok(self.states.decide(trace, particles, log_kept, &mut at.stream()))
-    }
-
-    fn log_evidence(&self) -> Option<f64> {
-        self.states.log_evidence()
-    }
 }

@@ -165,14 +165,5 @@ fn sample_log(log: &[f64], weights: &mut Vec<f64>, rng: &mut Stream) -> usize {
     let max = log.iter().copied().fold(f64::NEG_INFINITY, f64::max);
     weights.clear();
     weights.extend(log.iter().map(|l| if *l == max { 1.0 } else { libm::exp(l - max) }));
-    let mut u = rng.uniform() * weights.iter().sum::<f64>();
-    let mut last = 0;
-    for (i, p) in weights.iter().enumerate().filter(|(_, p)| **p > 0.0) {
-        last = i;
-        if u < *p {
-            break;
-        }
-        u -= p;
-    }
-    last
+    rng.weighted(weights, weights.iter().sum())
 }

@@ -2,7 +2,7 @@
 //! evidence (particle independent Metropolis-Hastings: Andrieu, Doucet & Holenstein 2010, section 2.4.2). Not here: how
 //! particles go from the prior to the posterior.
 
-use crate::infer::kernel::{At, Outcome, accepts};
+use crate::infer::kernel::{At, Kernel, Outcome, accepts};
 use crate::infer::selection::fail;
 use crate::lang::code::Observed;
 use crate::num::log_sum_exp;
@@ -11,11 +11,27 @@ use crate::syntax::span::Span;
 use crate::trace::{Constraint, Selector, Trace, TraceResult};
 use std::sync::Arc;
 
-/// Whole states, accepted with the ratio of the estimates of the evidence that they come with.
-pub(super) struct Independent {
-    kernel: &'static str,
+/// A way for particles from the prior to where they are wanted.
+pub(super) trait Way {
+    fn name(&self) -> &'static str;
+
+    /// Forgets what was learnt from other data.
+    fn forget(&mut self);
+
+    /// Draws particles and leads them there; gives them and the log of the evidence's estimate.
+    fn lead(&mut self, prior: &Prior, trace: &mut Trace, at: &At) -> TraceResult<(Vec<Trace>, f64)>;
+}
+
+/// Where particles are drawn from.
+pub(super) struct Prior {
     /// Choices that are not drawn anew.
     frozen: Selector,
+}
+
+/// Whole states, accepted with the ratio of the estimates of the evidence that they come with.
+pub struct Independent<W> {
+    way: W,
+    prior: Prior,
     span: Span,
     /// The state that was accepted last: its log joint density and the log of the evidence's estimate.
     accepted: Option<(f64, f64)>,
@@ -25,39 +41,8 @@ pub(super) struct Independent {
     estimates: Vec<f64>,
 }
 
-impl Independent {
-    /// For a kernel of this name; `span` is where errors point.
-    pub fn new(kernel: &'static str, frozen: Selector, span: Span) -> Self {
-        Independent { kernel, frozen, span, accepted: None, observed: None, estimates: Vec::new() }
-    }
-
-    /// Begins a step; true if it is the first of all or the first under other data, whose estimates start anew.
-    ///
-    /// # Errors
-    /// If the state is not the one that was accepted last.
-    pub fn begin(&mut self, trace: &mut Trace, at: &At) -> TraceResult<bool> {
-        trace.rollback();
-        if !self.observed.as_ref().is_some_and(|o| Arc::ptr_eq(o, trace.replacements())) {
-            self.observed = Some(Arc::clone(trace.replacements()));
-            self.accepted = None;
-            self.estimates.clear();
-            return Ok(true);
-        }
-        if let Some((log_joint, _)) = self.accepted
-            && log_joint.to_bits() != trace.log_joint().to_bits()
-            && !at.adapting
-        {
-            let name = self.kernel;
-            let mut e = fail(self.span, format!("another kernel moved the state between two steps of {name}"));
-            e.hint = Some(format!(
-                "{name} draws whole states by itself; its estimate of the evidence belongs to the state it drew"
-            ));
-            return Err(e);
-        }
-        Ok(false)
-    }
-
-    /// Particles from the prior; what is frozen stays.
+impl Prior {
+    /// Particles; what is frozen stays.
     ///
     /// # Errors
     /// Those of the program.
@@ -71,15 +56,43 @@ impl Independent {
         let one = |i: usize| trace.another(fixed.iter().cloned(), at.within(i as u64).draws(0));
         (0..particles).map(one).collect()
     }
+}
+
+#[allow(private_bounds)]
+impl<W: Way> Independent<W> {
+    /// For particles that go this way; frozen choices are not drawn anew. `span` is where errors point.
+    pub(super) fn by(way: W, frozen: Selector, span: Span) -> Self {
+        Independent { way, prior: Prior { frozen }, span, accepted: None, observed: None, estimates: Vec::new() }
+    }
+
+    /// Begins a step; true if it is the first of all or the first under other data, whose estimates start anew.
+    ///
+    /// # Errors
+    /// If the state is not the one that was accepted last.
+    fn begin(&mut self, trace: &mut Trace, at: &At) -> TraceResult<bool> {
+        trace.rollback();
+        if !self.observed.as_ref().is_some_and(|o| Arc::ptr_eq(o, trace.replacements())) {
+            self.observed = Some(Arc::clone(trace.replacements()));
+            self.accepted = None;
+            self.estimates.clear();
+            return Ok(true);
+        }
+        if let Some((log_joint, _)) = self.accepted
+            && log_joint.to_bits() != trace.log_joint().to_bits()
+            && !at.adapting
+        {
+            let name = self.way.name();
+            let mut e = fail(self.span, format!("another kernel moved the state between two steps of {name}"));
+            e.hint = Some(format!(
+                "{name} draws whole states by itself; its estimate of the evidence belongs to the state it drew"
+            ));
+            return Err(e);
+        }
+        Ok(false)
+    }
 
     /// Takes one of the particles as the new state, or stays.
-    pub fn decide(
-        &mut self,
-        trace: &mut Trace,
-        mut particles: Vec<Trace>,
-        log_evidence: f64,
-        rng: &mut Stream,
-    ) -> Outcome {
+    fn decide(&mut self, trace: &mut Trace, mut particles: Vec<Trace>, log_evidence: f64, rng: &mut Stream) -> Outcome {
         let one = rng.index(particles.len());
         self.estimates.push(log_evidence);
         let ratio = match self.accepted {
@@ -96,9 +109,23 @@ impl Independent {
         }
         Outcome::one(accepted)
     }
+}
+
+impl<W: Way + Send> Kernel for Independent<W> {
+    fn name(&self) -> String {
+        self.way.name().into()
+    }
+
+    fn step(&mut self, trace: &mut Trace, at: &At) -> TraceResult<Outcome> {
+        if self.begin(trace, at)? {
+            self.way.forget();
+        }
+        let (particles, log_evidence) = self.way.lead(&self.prior, trace, at)?;
+        Ok(self.decide(trace, particles, log_evidence, &mut at.stream()))
+    }
 
     /// The log of the mean of all estimates.
-    pub fn log_evidence(&self) -> Option<f64> {
+    fn log_evidence(&self) -> Option<f64> {
         let n = self.estimates.len();
         (n > 0).then(|| log_sum_exp(&self.estimates) - libm::log(n as f64))
     }

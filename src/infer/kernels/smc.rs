@@ -6,8 +6,8 @@
 //! Holenstein 2010, section 2.4.2) leaves the posterior exactly invariant for any number of particles. The powers are
 //! found in the first run, so that half of the weights count at each, and stay as they are.
 
-use super::particles::Independent;
-use crate::infer::kernel::{At, Kernel, Outcome, inner_step};
+use super::particles::{Independent, Prior, Way};
+use crate::infer::kernel::{At, Kernel, inner_step};
 use crate::infer::resampling::systematic;
 use crate::num::log_sum_exp;
 use crate::syntax::span::Span;
@@ -17,23 +17,34 @@ use crate::trace::{Selector, Trace, TraceResult};
 const MOST_POWERS: usize = 1000;
 
 /// Particle independent Metropolis-Hastings around a kernel.
-pub struct Smc {
+pub type Smc = Independent<Annealed>;
+
+/// The power of the likelihood rises from 0 to 1.
+pub struct Annealed {
     kernel: Box<dyn Kernel>,
     particles: usize,
     /// The powers of the likelihood, the last one 1; found in the first run.
     powers: Vec<f64>,
-    states: Independent,
 }
 
 impl Smc {
     /// So many particles, moved by a kernel; frozen choices are not drawn anew. `span` is where errors point.
     pub fn new(kernel: Box<dyn Kernel>, particles: usize, frozen: Selector, span: Span) -> Self {
-        Smc { kernel, particles, powers: Vec::new(), states: Independent::new("smc", frozen, span) }
+        Independent::by(Annealed { kernel, particles, powers: Vec::new() }, frozen, span)
+    }
+}
+
+impl Way for Annealed {
+    fn name(&self) -> &'static str {
+        "smc"
     }
 
-    /// Raises the power from 0 to 1; gives the particles and the log of the evidence's estimate.
-    fn run(&mut self, trace: &mut Trace, at: &At) -> TraceResult<(Vec<Trace>, f64)> {
-        let mut particles = self.states.draw(trace, self.particles, at)?;
+    fn forget(&mut self) {
+        self.powers.clear();
+    }
+
+    fn lead(&mut self, prior: &Prior, trace: &mut Trace, at: &At) -> TraceResult<(Vec<Trace>, f64)> {
+        let mut particles = prior.draw(trace, self.particles, at)?;
         let find = self.powers.is_empty();
         let (mut power, mut log_evidence, mut rung) = (0.0, 0.0, 0);
         while power < 1.0 {
@@ -81,22 +92,4 @@ fn next_power(likelihoods: &[f64], power: f64) -> f64 {
         if enough(middle) { low = middle } else { high = middle }
     }
     if low > power { low } else { high }
-}
-
-impl Kernel for Smc {
-    fn name(&self) -> String {
-        "smc".into()
-    }
-
-    fn step(&mut self, trace: &mut Trace, at: &At) -> TraceResult<Outcome> {
-        if self.states.begin(trace, at)? {
-            self.powers.clear();
-        }
-        let (particles, log_evidence) = self.run(trace, at)?;
-        Ok(self.states.decide(trace, particles, log_evidence, &mut at.stream()))
-    }
-
-    fn log_evidence(&self) -> Option<f64> {
-        self.states.log_evidence()
-    }
 }

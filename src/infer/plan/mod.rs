@@ -431,17 +431,8 @@ impl Runner<'_> {
         }
         let total: f64 = weights.iter().sum();
         let key = StreamKey::new(self.options.seed, self.chain, Purpose::MIX);
-        let mut u = key.stream(self.step, 0, 0).uniform() * total;
-        for (a, w) in arms.iter().zip(&weights) {
-            if u < *w {
-                return self.apply(&a.kernel);
-            }
-            u -= w;
-        }
-        match arms.last() {
-            Some(a) => self.apply(&a.kernel),
-            None => Ok(Flow::Next),
-        }
+        let arm = key.stream(self.step, 0, 0).weighted(&weights, total);
+        arms.get(arm).map_or(Ok(Flow::Next), |a| self.apply(&a.kernel))
     }
 
     /// Applies a kernel, or another statement that looks like a call.

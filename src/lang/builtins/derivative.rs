@@ -22,24 +22,15 @@ pub enum Derivative {
     Zero,
     /// Its vector-Jacobian product.
     Product(Pull),
-    /// That of a function of one number, element by element.
-    Unary(&'static Unary),
+    /// dy/dx of a function of one number, element by element: of x and y.
+    Unary(fn(f64, f64) -> f64),
     /// That of a function of two numbers, element by element.
     Binary(&'static Binary),
     /// That of a function of an array that gives one number.
     Reduction(&'static Reduction),
 }
 
-/// A function of one number.
-#[derive(Debug)]
-pub struct Unary {
-    /// The function.
-    pub value: fn(f64) -> f64,
-    /// dy/dx, of x and y.
-    pub slope: fn(f64, f64) -> f64,
-}
-
-/// A function of two numbers, also in loops over numbers in a buffer (see `binary_form`).
+/// A function of two numbers, also in loops over numbers in a buffer (see `of_pairs`).
 #[derive(Debug)]
 pub struct Binary {
     /// dz/dx and dz/dy, of x, y and z.
@@ -68,7 +59,7 @@ impl Derivative {
             (Derivative::Unknown, _) => None,
             (Derivative::Zero, _) => Some(Pulled::new()),
             (Derivative::Product(f), _) => f(a, value, by),
-            (Derivative::Unary(f), _) => unary(a, value, by, f.slope),
+            (Derivative::Unary(f), _) => unary(a, value, by, *f),
             (Derivative::Binary(f), Value::Object(_)) => f.objects.and_then(|pull| pull(a, value, by)),
             (Derivative::Binary(f), _) => of_two(a, value, by, f.slopes),
             (Derivative::Reduction(f), _) => reduction(a, value, by, f.slopes),
@@ -76,27 +67,26 @@ impl Derivative {
     }
 }
 
-/// The form of a function of two numbers and its slopes: loops made for them, so that arithmetic runs over buffers without calls.
-macro_rules! binary_form {
-    ($f:expr, $slopes:expr) => {
-        binary_form!($f, $slopes, None)
+/// A row of a function of two numbers with its slopes, of x, y and z: loops made for them, so that arithmetic runs over
+/// buffers without calls.
+macro_rules! of_pairs {
+    ($row:expr, $f:expr, $slopes:expr) => {
+        of_pairs!($row, $f, $slopes, None)
     };
-    ($f:expr, $slopes:expr, $objects:expr) => {
-        $crate::lang::builtins::derivative::Derivative::Binary(
-            &const {
-                $crate::lang::builtins::derivative::Binary {
-                    slopes: $slopes,
-                    forward: |v, x, y, out, n| $crate::lang::builtins::derivative::each_pair(v, x, y, out, n, $f),
-                    reverse: |v, g, x, y, out, n| {
-                        $crate::lang::builtins::derivative::pull_pairs(v, g, x, y, out, n, $slopes)
-                    },
-                    objects: $objects,
-                }
-            },
-        )
-    };
+    ($row:expr, $f:expr, $slopes:expr, $objects:expr) => {{
+        use $crate::lang::builtins::derivative::{Binary, each_pair, pull_pairs};
+        let form: &'static Binary = &const {
+            Binary {
+                slopes: $slopes,
+                forward: |v, x, y, out, n| each_pair(v, x, y, out, n, $f),
+                reverse: |v, g, x, y, out, n| pull_pairs(v, g, x, y, out, n, $slopes),
+                objects: $objects,
+            }
+        };
+        $row.scalar(Scalar::Binary($f)).derivative(Derivative::Binary(form))
+    }};
 }
-pub(super) use binary_form;
+pub(super) use of_pairs;
 
 /// Fills in the results of a function of two columns that lie before them in a buffer.
 #[inline(always)]

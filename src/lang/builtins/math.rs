@@ -1,6 +1,6 @@
 //! Functions of numbers, element by element on arrays, through libm so that they are the same on every platform.
 
-use super::derivative::{Unary, binary_form, one_of};
+use super::derivative::{of_pairs, one_of};
 use super::elementwise::{mapped, numeric};
 use super::reduce::{largest, smallest};
 use super::{Arg, Args, Builtin, Derivative, Pulled, Scalar, Type, arg, function};
@@ -21,7 +21,7 @@ macro_rules! smooth {
     ($name:literal, $args:ident, $doc:literal, $f:expr, $slope:expr) => {
         function($name, SECTION, $args, Type::Nums, $doc, mapped)
             .scalar(Scalar::Unary($f))
-            .derivative(Derivative::Unary(&const { Unary { value: $f, slope: $slope } }))
+            .derivative(Derivative::Unary($slope))
     };
 }
 
@@ -36,16 +36,18 @@ pub(super) const TABLE: &[Builtin] = &[
     smooth!("log", X, "The natural logarithm; -inf at 0, NaN below.", libm::log, |x, _| 1.0 / x),
     smooth!("log1p", X, "`log(1 + x)`, accurate near 0.", libm::log1p, |x, _| 1.0 / (1.0 + x)),
     smooth!("sqrt", X, "The square root; NaN below 0.", f64::sqrt, |_, y| 0.5 / y),
-    function(
-        "pow",
-        SECTION,
-        &[arg("x", Type::Nums, "The base."), arg("y", Type::Nums, "The exponent.")],
-        Type::Nums,
-        "`x ** y`.",
-        mapped,
-    )
-    .scalar(Scalar::Binary(libm::pow))
-    .derivative(binary_form!(libm::pow, pow_slopes)),
+    of_pairs!(
+        function(
+            "pow",
+            SECTION,
+            &[arg("x", Type::Nums, "The base."), arg("y", Type::Nums, "The exponent.")],
+            Type::Nums,
+            "`x ** y`.",
+            mapped,
+        ),
+        libm::pow,
+        pow_slopes
+    ),
     smooth!("abs", X, "The absolute value.", f64::abs, |x, _| sign(x)),
     steps("sign", "-1, 0 or 1.", sign),
     steps("step", "0 below 0, 1 from 0 on.", step),
@@ -92,19 +94,21 @@ pub(super) const TABLE: &[Builtin] = &[
     smooth!("asin", X, "The angle in [-pi/2, pi/2] with this sine.", libm::asin, |x, _| 1.0 / (1.0 - x * x).sqrt()),
     smooth!("acos", X, "The angle in [0, pi] with this cosine.", libm::acos, |x, _| -1.0 / (1.0 - x * x).sqrt()),
     smooth!("atan", X, "The angle in (-pi/2, pi/2) with this tangent.", libm::atan, |x, _| 1.0 / (1.0 + x * x)),
-    function(
-        "atan2",
-        SECTION,
-        &[arg("y", Type::Nums, "The height."), arg("x", Type::Nums, "The width.")],
-        Type::Nums,
-        "The angle of the point (x, y) in [-pi, pi], in radians.",
-        mapped,
-    )
-    .scalar(Scalar::Binary(libm::atan2))
-    .derivative(binary_form!(libm::atan2, |y, x, _| {
-        let square = x * x + y * y;
-        [x / square, -y / square]
-    })),
+    of_pairs!(
+        function(
+            "atan2",
+            SECTION,
+            &[arg("y", Type::Nums, "The height."), arg("x", Type::Nums, "The width.")],
+            Type::Nums,
+            "The angle of the point (x, y) in [-pi, pi], in radians.",
+            mapped,
+        ),
+        libm::atan2,
+        |y, x, _| {
+            let square = x * x + y * y;
+            [x / square, -y / square]
+        }
+    ),
     smooth!("sinh", X, "The hyperbolic sine.", libm::sinh, |x, _| libm::cosh(x)),
     smooth!("cosh", X, "The hyperbolic cosine.", libm::cosh, |x, _| libm::sinh(x)),
     smooth!("tanh", X, "The hyperbolic tangent.", libm::tanh, |_, y| 1.0 - y * y),

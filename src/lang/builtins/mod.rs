@@ -24,7 +24,7 @@ mod table;
 pub use args::Args;
 pub use covariance::CovarianceValue;
 pub(crate) use derivative::times;
-pub use derivative::{Binary, Derivative, Pull, Pulled, Reduction, Unary};
+pub use derivative::{Binary, Derivative, Pull, Pulled, Reduction};
 pub(crate) use reduce::dot;
 pub use table::{Constant, Table};
 

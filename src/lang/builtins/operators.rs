@@ -4,7 +4,7 @@
 
 use super::args::MAX_ELEMENTS;
 use super::covariance::CovarianceValue;
-use super::derivative::{Unary, binary_form};
+use super::derivative::of_pairs;
 use super::elementwise::{self, array, array_len, broadcast, mapped, numeric};
 use super::math::pow_slopes;
 use super::{Arg, Args, Builtin, Derivative, Scalar, Type, arg, function};
@@ -23,36 +23,32 @@ const fn infix(name: &'static str, returns: Type, doc: &'static str, f: fn(&Args
 /// The row of an operator on numbers with its slopes, of x, y and z.
 macro_rules! arithmetic {
     ($name:literal, $doc:literal, $f:expr, $slopes:expr) => {
-        infix($name, Type::Nums, $doc, arithmetic).scalar(Scalar::Binary($f)).derivative(binary_form!($f, $slopes))
+        of_pairs!(infix($name, Type::Nums, $doc, arithmetic), $f, $slopes)
     };
 }
 
 pub(super) const TABLE: &[Builtin] = &[
-    infix("+", Type::Any, "Sum of numbers, element by element; joins two strings; adds covariances.", add)
-        .scalar(Scalar::Binary(|x, y| x + y))
-        .derivative(binary_form!(
-            |x, y| x + y,
-            |_, _, _| [1.0, 1.0],
-            Some(|a, _, by| {
-                CovarianceValue::pull_both(a.get(0), a.get(1), by).map(|both| both.into_iter().collect())
-            })
-        )),
+    of_pairs!(
+        infix("+", Type::Any, "Sum of numbers, element by element; joins two strings; adds covariances.", add),
+        |x, y| x + y,
+        |_, _, _| [1.0, 1.0],
+        Some(|a, _, by| { CovarianceValue::pull_both(a.get(0), a.get(1), by).map(|both| both.into_iter().collect()) })
+    ),
     arithmetic!("-", "Difference, element by element.", |x, y| x - y, |_, _, _| [1.0, -1.0]),
-    infix(
-        "*",
-        Type::Any,
-        "Product of numbers, element by element; applies a placement to a solid; multiplies covariances.",
-        multiply,
-    )
-    .scalar(Scalar::Binary(|x, y| x * y))
-    .derivative(binary_form!(
+    of_pairs!(
+        infix(
+            "*",
+            Type::Any,
+            "Product of numbers, element by element; applies a placement to a solid; multiplies covariances.",
+            multiply,
+        ),
         |x, y| x * y,
         |x, y, _| [y, x],
         Some(|a, _, by| match a.get(0) {
             Value::Object(o) => o.pull_product(a.get(1), by).map(|both| both.into_iter().collect()),
             _ => None,
         })
-    )),
+    ),
     arithmetic!("/", "Quotient, element by element; by zero it is an infinity or NaN.", |x, y| x / y, |_, y, z| {
         [1.0 / y, -z / y]
     }),
@@ -69,7 +65,7 @@ pub(super) const TABLE: &[Builtin] = &[
         mapped,
     )
     .scalar(Scalar::Unary(|x| -x))
-    .derivative(Derivative::Unary(&Unary { value: |x| -x, slope: |_, _| -1.0 })),
+    .derivative(Derivative::Unary(|_, _| -1.0)),
     function(
         "not",
         SECTION,

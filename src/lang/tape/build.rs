@@ -6,7 +6,7 @@ use super::form::{Form, Made};
 use super::op::Op;
 use super::{Input, Sums, Tape};
 use crate::dist::{Dist, Support, batch, batch_of_mixture};
-use crate::lang::builtins::{Binary, Builtin, CovarianceValue, Derivative, Kind, Reduction, Unary};
+use crate::lang::builtins::{Binary, Builtin, CovarianceValue, Derivative, Kind, Reduction, Scalar};
 use crate::lang::value::Value;
 use crate::num::Column;
 use smallvec::SmallVec;
@@ -90,7 +90,10 @@ impl Builder {
             return Some(Form::Fixed(now.clone()));
         }
         let special = match (&builtin.derivative, &args[..]) {
-            (Derivative::Unary(f), [x]) => self.unary(f, x),
+            (Derivative::Unary(slope), [x]) => match builtin.scalar {
+                Some(Scalar::Unary(f)) => self.unary(f, *slope, x),
+                _ => None,
+            },
             (Derivative::Binary(f), [x, y]) if numeric(now) => self.binary(f, x, y, now),
             (Derivative::Reduction(f), [x]) => self.reduce(f, x),
             _ if builtin.full_name() == "matmul" => self.matrix(&args),
@@ -117,18 +120,18 @@ impl Builder {
         cheap.then(|| Form::Made(Arc::new(Made { builtin: *builtin, args: args.into() })))
     }
 
-    fn unary(&mut self, f: &'static Unary, x: &Form) -> Option<Form> {
+    fn unary(&mut self, f: fn(f64) -> f64, slope: fn(f64, f64) -> f64, x: &Form) -> Option<Form> {
         match x {
-            Form::Fixed(Value::Num(x)) => Some(Form::Fixed(Value::Num((f.value)(*x)))),
-            Form::List(all) => Some(Form::List(all.iter().map(|x| self.unary(f, x)).collect::<Option<_>>()?)),
+            Form::Fixed(Value::Num(x)) => Some(Form::Fixed(Value::Num(f(*x)))),
+            Form::List(all) => Some(Form::List(all.iter().map(|x| self.unary(f, slope, x)).collect::<Option<_>>()?)),
             Form::Num(x) => {
                 let out = self.reserve(1);
-                self.ops.push(Op::Unary { f, x: *x, out, n: 1 });
+                self.ops.push(Op::Unary { f, slope, x: *x, out, n: 1 });
                 Some(Form::Num(out))
             }
             Form::Array(x, n) => {
                 let out = self.reserve(*n);
-                self.ops.push(Op::Unary { f, x: *x, out, n: *n });
+                self.ops.push(Op::Unary { f, slope, x: *x, out, n: *n });
                 Some(Form::Array(out, *n))
             }
             _ => None,

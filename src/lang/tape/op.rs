@@ -3,7 +3,7 @@
 use super::Sums;
 use super::form::{Form, call, pull_call};
 use crate::dist::{Batch, Dist};
-use crate::lang::builtins::{Binary, Builtin, Reduction, Unary, times};
+use crate::lang::builtins::{Binary, Builtin, Reduction, times};
 use crate::lang::density;
 use crate::lang::value::Value;
 use crate::num::{Column, ExactSum};
@@ -12,8 +12,8 @@ use smallvec::SmallVec;
 /// An operation: it reads numbers that lie before those it writes.
 #[derive(Debug)]
 pub(super) enum Op {
-    /// A function of one number, element by element.
-    Unary { f: &'static Unary, x: usize, out: usize, n: usize },
+    /// A function of one number and its slope, of x and y, element by element.
+    Unary { f: fn(f64) -> f64, slope: fn(f64, f64) -> f64, x: usize, out: usize, n: usize },
     /// A function of two.
     Binary { f: &'static Binary, x: Column, y: Column, out: usize, n: usize },
     /// A function of an array that gives one number.
@@ -38,9 +38,9 @@ impl Op {
     /// Runs it; false if that cannot be told from here.
     pub fn forward(&mut self, v: &mut [f64], sums: &mut Sums) -> bool {
         match self {
-            Op::Unary { f, x, out, n } => {
+            Op::Unary { f, x, out, n, .. } => {
                 let (before, y) = v.split_at_mut(*out);
-                y[..*n].iter_mut().zip(&before[*x..*x + *n]).for_each(|(y, x)| *y = (f.value)(*x));
+                y[..*n].iter_mut().zip(&before[*x..*x + *n]).for_each(|(y, x)| *y = f(*x));
                 true
             }
             Op::Binary { f, x, y, out, n } => {
@@ -83,9 +83,9 @@ impl Op {
     pub fn reverse(&self, v: &[f64], g: &mut [f64], power: f64, scratch: &mut Vec<f64>) -> bool {
         let weight = |observed: bool| if observed { power } else { 1.0 };
         match self {
-            Op::Unary { f, x, out, n } => {
+            Op::Unary { slope, x, out, n, .. } => {
                 for i in 0..*n {
-                    g[x + i] += times(g[out + i], (f.slope)(v[x + i], v[out + i]));
+                    g[x + i] += times(g[out + i], slope(v[x + i], v[out + i]));
                 }
                 true
             }

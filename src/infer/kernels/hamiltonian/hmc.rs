@@ -1,67 +1,39 @@
 //! `hmc(sel, steps)` and `mala(sel)`: trajectories of a fixed number of leapfrog steps (Neal 2011).
 
-use super::summed::with_alternatives;
-use super::{Adaptation, DIVERGENT, Memory, System, system};
-use crate::infer::kernel::{At, Kernel, Outcome, Pick, Registered, Scope, accepts};
-use crate::trace::{Selector, Target, Trace, TraceResult};
+use super::{DIVERGENT, End, Hamiltonian, Path, Trajectory, system};
+use crate::infer::kernel::{Scope, accepts};
+use crate::trace::TraceResult;
 
 /// Hamiltonian Monte Carlo; with one step it is the Metropolis-adjusted Langevin algorithm.
+pub type Hmc = Hamiltonian<Leaps>;
+
+/// So many leapfrog steps, accepted or rejected as a whole.
 #[derive(Clone, Debug)]
-pub struct Hmc {
-    scope: Registered,
-    /// Finite choices that are summed out.
-    summed: Registered,
-    steps: u32,
-    adaptation: Adaptation,
-    memory: Memory,
-}
+pub struct Leaps(u32);
 
 impl Hmc {
     /// The kernel for these choices, with so many leapfrog steps and a step size, or else one that is learnt.
     pub fn new(scope: Scope, steps: u32, step: Option<f64>) -> Self {
         // The best acceptance of long trajectories, and of Langevin steps (Roberts & Rosenthal 1998, Beskos et al. 2013).
         let target = if steps == 1 { 0.574 } else { 0.8 };
-        let adaptation = Adaptation::new(target, step);
-        let (scope, summed) = (Registered::new(scope), Registered::nothing());
-        Hmc { scope, summed, steps: steps.max(1), adaptation, memory: Memory::default() }
-    }
-
-    /// The same with these finite choices summed out of the density that it sees.
-    #[must_use]
-    pub fn summing_out(self, choices: Selector) -> Self {
-        Hmc { summed: Registered::new(Scope { selector: choices, pick: Pick::All }), ..self }
+        Hamiltonian::along(Leaps(steps.max(1)), scope, target, step)
     }
 }
 
-impl Kernel for Hmc {
-    fn name(&self) -> String {
-        if self.steps == 1 { "mala".into() } else { "hmc".into() }
+impl Trajectory for Leaps {
+    fn name(&self) -> &'static str {
+        if self.0 == 1 { "mala" } else { "hmc" }
     }
 
-    fn step(&mut self, trace: &mut Trace, at: &At) -> TraceResult<Outcome> {
-        let mut summed = self.summed.clone();
-        let outcome = with_alternatives(&mut summed, trace, at, |trace, sites| self.go(trace, at, sites));
-        self.summed = summed;
-        outcome
-    }
-}
-
-impl Hmc {
-    fn go(&mut self, trace: &mut Trace, at: &At, sites: &[Target]) -> TraceResult<Outcome> {
-        let mut rng = at.stream();
-        let (targets, _) = self.scope.members(trace, at, &mut rng);
-        let Some((mut system, here)) = System::begin(trace, at, &targets, sites, &mut self.memory)? else {
-            return Ok(Outcome::default());
-        };
-        let step = self.adaptation.step(&mut system, &here, at.adapting, &mut rng)?;
+    fn walk(&self, path: &mut Path) -> TraceResult<End> {
+        let Path { system, here, step, inverse_mass, rng } = path;
         // Of uneven length, so that no trajectory comes back to where it began again and again.
-        let step = step * (0.9 + 0.2 * rng.uniform());
-        let mass = &self.adaptation.inverse_mass;
-        let mut point = system.launch(&here, mass, &mut rng);
-        let energy = system::kinetic(&point, mass);
+        let step = *step * (0.9 + 0.2 * rng.uniform());
+        let mut point = system.launch(here, inverse_mass, rng);
+        let energy = system::kinetic(&point, inverse_mass);
         let mut there = true;
-        for _ in 0..self.steps {
-            match system.leapfrog(&point, step, mass)? {
+        for _ in 0..self.0 {
+            match system.leapfrog(&point, step, inverse_mass)? {
                 Some(to) => point = to,
                 None => {
                     there = false;
@@ -70,16 +42,12 @@ impl Hmc {
             }
         }
         let ratio = if there {
-            point.log_density - here.log_density + energy - system::kinetic(&point, mass)
+            point.log_density - here.log_density + energy - system::kinetic(&point, inverse_mass)
         } else {
             f64::NEG_INFINITY
         };
-        let accepted = there && accepts(ratio, &mut rng);
-        let accepted = system.settle(accepted.then_some(&*point))?;
-        if at.adapting {
-            self.adaptation.learn(libm::exp(ratio.min(0.0)), if accepted { &point.y } else { &here.y });
-        }
+        let accepted = there && accepts(ratio, rng);
         let divergent = ratio.is_nan() || ratio <= -DIVERGENT;
-        Ok(Outcome { failed: u32::from(!there), divergent: u32::from(divergent), ..Outcome::one(accepted) })
+        Ok(End { to: accepted.then_some(point), acceptance: libm::exp(ratio.min(0.0)), failed: !there, divergent })
     }
 }

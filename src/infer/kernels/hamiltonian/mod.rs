@@ -7,6 +7,7 @@
 
 mod adapt;
 mod hmc;
+mod kernel;
 mod memory;
 mod nuts;
 mod optimize;
@@ -14,10 +15,11 @@ mod summed;
 mod system;
 
 pub use hmc::Hmc;
+pub use kernel::Hamiltonian;
 pub use nuts::Nuts;
 pub use optimize::Optimize;
 
-use adapt::Adaptation;
+use kernel::{End, Path, Trajectory};
 use memory::Memory;
 use system::{Point, System};
 

@@ -1,37 +1,24 @@
 //! `nuts(sel, max_depth)`: the No-U-Turn sampler (Hoffman & Gelman 2014) with multinomial sampling over the trajectory and the
 //! generalised stopping rule, checked across subtrees too (Betancourt 2017; as Stan has it).
 
-use super::summed::with_alternatives;
-use super::{Adaptation, DIVERGENT, Memory, Point, System, system};
-use crate::infer::kernel::{At, Kernel, Outcome, Pick, Registered, Scope};
+use super::{DIVERGENT, End, Hamiltonian, Path, Point, System, Trajectory, system};
+use crate::infer::kernel::Scope;
 use crate::num::log_sum_exp;
 use crate::rng::Stream;
-use crate::trace::{Selector, Target, Trace, TraceResult};
+use crate::trace::TraceResult;
 use std::sync::Arc;
 
 /// The No-U-Turn sampler.
+pub type Nuts = Hamiltonian<Doubling>;
+
+/// A trajectory that doubles until it turns, at most so many times.
 #[derive(Clone, Debug)]
-pub struct Nuts {
-    scope: Registered,
-    /// Finite choices that are summed out.
-    summed: Registered,
-    max_depth: u32,
-    adaptation: Adaptation,
-    memory: Memory,
-}
+pub struct Doubling(u32);
 
 impl Nuts {
     /// The kernel for these choices; a trajectory doubles at most `max_depth` times.
     pub fn new(scope: Scope, max_depth: u32) -> Self {
-        let adaptation = Adaptation::new(0.8, None);
-        let (scope, summed) = (Registered::new(scope), Registered::nothing());
-        Nuts { scope, summed, max_depth, adaptation, memory: Memory::default() }
-    }
-
-    /// The same with these finite choices summed out of the density that it sees.
-    #[must_use]
-    pub fn summing_out(self, choices: Selector) -> Self {
-        Nuts { summed: Registered::new(Scope { selector: choices, pick: Pick::All }), ..self }
+        Hamiltonian::along(Doubling(max_depth), scope, 0.8, None)
     }
 }
 
@@ -122,44 +109,21 @@ fn reversed(mut t: Tree) -> Tree {
     t
 }
 
-impl Kernel for Nuts {
-    fn name(&self) -> String {
-        "nuts".into()
+impl Trajectory for Doubling {
+    fn name(&self) -> &'static str {
+        "nuts"
     }
 
-    fn step(&mut self, trace: &mut Trace, at: &At) -> TraceResult<Outcome> {
-        let mut summed = self.summed.clone();
-        let outcome = with_alternatives(&mut summed, trace, at, |trace, sites| self.go(trace, at, sites));
-        self.summed = summed;
-        outcome
-    }
-}
-
-impl Nuts {
-    fn go(&mut self, trace: &mut Trace, at: &At, sites: &[Target]) -> TraceResult<Outcome> {
-        let mut rng = at.stream();
-        let (targets, _) = self.scope.members(trace, at, &mut rng);
-        let Some((mut system, here)) = System::begin(trace, at, &targets, sites, &mut self.memory)? else {
-            return Ok(Outcome::default());
-        };
-        let step = self.adaptation.step(&mut system, &here, at.adapting, &mut rng)?;
-        let mass = &self.adaptation.inverse_mass;
-        let start = system.launch(&here, mass, &mut rng);
+    fn walk(&self, path: &mut Path) -> TraceResult<End> {
+        let Path { system, here, step, inverse_mass: mass, rng } = path;
+        let step = *step;
+        let start = system.launch(here, mass, rng);
         let energy = system::kinetic(&start, mass) - here.log_density;
-        let mut walk = Walk {
-            system: &mut system,
-            mass,
-            step,
-            energy,
-            acceptance: 0.0,
-            leaps: 0.0,
-            divergent: false,
-            rng: &mut rng,
-        };
+        let mut walk = Walk { system, mass, step, energy, acceptance: 0.0, leaps: 0.0, divergent: false, rng };
         // In the order of time: `first` is the past.
         let mut tree = walk.leaf(start, 0.0);
         let mut moved = false;
-        for depth in 0..self.max_depth {
+        for depth in 0..self.0 {
             let forward = walk.rng.uniform() < 0.5;
             walk.step = if forward { step } else { -step };
             let from = Arc::clone(if forward { &tree.last } else { &tree.first });
@@ -183,10 +147,6 @@ impl Nuts {
             }
         }
         let (acceptance, divergent) = (walk.acceptance / walk.leaps.max(1.0), walk.divergent);
-        let moved = system.settle(moved.then_some(&*tree.proposal))?;
-        if at.adapting {
-            self.adaptation.learn(acceptance, if moved { &tree.proposal.y } else { &here.y });
-        }
-        Ok(Outcome { divergent: u32::from(divergent), ..Outcome::one(moved) })
+        Ok(End { to: moved.then_some(tree.proposal), acceptance, failed: false, divergent })
     }
 }

@@ -6,7 +6,7 @@
 //! of a mixture that no label points at) are drawn from their prior for the time of the move, and forgotten after it.
 
 use super::{Point, System};
-use crate::infer::kernel::{At, Outcome, Registered, recoverable};
+use crate::infer::kernel::{At, Outcome, recoverable};
 use crate::infer::selection::fail;
 use crate::num::log_sum_exp;
 use crate::rng::Stream;
@@ -31,12 +31,11 @@ struct View {
 
 /// Makes a step with all choices there that the values of what is summed out ask for, and gives it what that is.
 pub(super) fn with_alternatives(
-    summed: &mut Registered,
+    sites: Vec<Target>,
     trace: &mut Trace,
     at: &At,
     step: impl FnOnce(&mut Trace, &[Target]) -> TraceResult<Outcome>,
 ) -> TraceResult<Outcome> {
-    let sites = summed.members(trace, at, &mut at.stream()).0;
     if sites.is_empty() {
         return step(trace, &sites);
     }
@@ -147,13 +146,6 @@ impl System<'_> {
 
 /// A value drawn with these log probabilities.
 fn draw(log: &[f64], rng: &mut Stream) -> usize {
-    let (mut u, mut last) = (rng.uniform(), 0);
-    for (i, p) in log.iter().map(|l| libm::exp(*l)).enumerate().filter(|(_, p)| *p > 0.0) {
-        last = i;
-        if u < p {
-            break;
-        }
-        u -= p;
-    }
-    last
+    let probabilities: Vec<f64> = log.iter().map(|l| libm::exp(*l)).collect();
+    rng.weighted(&probabilities, 1.0)
 }

@@ -1,0 +1,95 @@
+//! What kernels that follow trajectories share: choices, what is summed out, adaptation, memory.
+
+use super::adapt::Adaptation;
+use super::summed::with_alternatives;
+use super::{Memory, Point, System};
+use crate::infer::kernel::{At, Kernel, Outcome, Pick, Registered, Scope};
+use crate::rng::Stream;
+use crate::trace::{Selector, Target, Trace, TraceResult};
+use std::sync::Arc;
+
+/// How a kernel goes through the space.
+pub(super) trait Trajectory {
+    fn name(&self) -> &'static str;
+
+    /// Goes from a place to another that leaves the density invariant.
+    fn walk(&self, path: &mut Path) -> TraceResult<End>;
+}
+
+/// What a trajectory goes by.
+pub(super) struct Path<'s, 'a> {
+    pub system: &'s mut System<'a>,
+    pub here: &'s Point,
+    pub step: f64,
+    pub inverse_mass: &'s [f64],
+    pub rng: &'s mut Stream,
+}
+
+/// Where a trajectory led.
+#[derive(Default)]
+pub(super) struct End {
+    /// The place that was drawn, if it is another.
+    pub to: Option<Arc<Point>>,
+    /// The mean acceptance along the way, which the step size is learnt from.
+    pub acceptance: f64,
+    /// Whether the way came to where the program has no value.
+    pub failed: bool,
+    pub divergent: bool,
+}
+
+/// A kernel of Hamiltonian dynamics that goes along trajectories of one kind.
+#[derive(Clone, Debug)]
+pub struct Hamiltonian<T> {
+    trajectory: T,
+    scope: Registered,
+    /// Finite choices that are summed out.
+    summed: Registered,
+    adaptation: Adaptation,
+    memory: Memory,
+}
+
+impl<T> Hamiltonian<T> {
+    /// For these choices: the mean acceptance aimed at, and a step size, or else one that is learnt.
+    pub(super) fn along(trajectory: T, scope: Scope, target: f64, step: Option<f64>) -> Self {
+        let (scope, summed) = (Registered::new(scope), Registered::nothing());
+        Hamiltonian { trajectory, scope, summed, adaptation: Adaptation::new(target, step), memory: Memory::default() }
+    }
+
+    /// The same with these finite choices summed out of the density that it sees.
+    #[must_use]
+    pub fn summing_out(self, choices: Selector) -> Self {
+        Hamiltonian { summed: Registered::new(Scope { selector: choices, pick: Pick::All }), ..self }
+    }
+}
+
+#[allow(private_bounds)]
+impl<T: Trajectory> Hamiltonian<T> {
+    fn go(&mut self, trace: &mut Trace, at: &At, sites: &[Target]) -> TraceResult<Outcome> {
+        let mut rng = at.stream();
+        let (targets, _) = self.scope.members(trace, at, &mut rng);
+        let Some((mut system, here)) = System::begin(trace, at, &targets, sites, &mut self.memory)? else {
+            return Ok(Outcome::default());
+        };
+        let step = self.adaptation.step(&mut system, &here, at.adapting, &mut rng)?;
+        let inverse_mass = &self.adaptation.inverse_mass;
+        let mut path = Path { system: &mut system, here: &here, step, inverse_mass, rng: &mut rng };
+        let end = self.trajectory.walk(&mut path)?;
+        let moved = system.settle(end.to.as_deref())?;
+        if at.adapting {
+            let y = end.to.as_ref().filter(|_| moved).map_or(&here.y, |to| &to.y);
+            self.adaptation.learn(end.acceptance, y);
+        }
+        Ok(Outcome { failed: u32::from(end.failed), divergent: u32::from(end.divergent), ..Outcome::one(moved) })
+    }
+}
+
+impl<T: Trajectory + Send> Kernel for Hamiltonian<T> {
+    fn name(&self) -> String {
+        self.trajectory.name().into()
+    }
+
+    fn step(&mut self, trace: &mut Trace, at: &At) -> TraceResult<Outcome> {
+        let sites = self.summed.members(trace, at, &mut at.stream()).0;
+        with_alternatives(sites, trace, at, |trace, sites| self.go(trace, at, sites))
+    }
+}
