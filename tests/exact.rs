@@ -550,3 +550,18 @@ fn falling_tolerances_give_the_probability_of_the_data() {
     let log = posterior.chains[0].kernels[0].log_evidence.unwrap_or(f64::NAN);
     assert!((log + 11f64.ln()).abs() < 0.03, "{log}");
 }
+
+/// A choice that vanishes with the value that its own mean follows.
+#[test]
+fn choices_vanish_with_the_density_that_they_had() {
+    let there = integrate(|x| normal_pdf(x, 0.0, 1.0) * normal_pdf(1.0, x, 1.0), -12.0, 12.0, 2000);
+    let gone = normal_pdf(1.0, 0.5, 1.0);
+    for kernel in ["mh(one(@**))", "gibbs(one(@k))", "block(@**)"] {
+        let text = format!(
+            "assume k ~ categorical([1, 1, 1]); x ~ normal(2 * k, 1); observe normal(if k == 0 {{ x }} else {{ 0.5 }}, 1) = 1;
+             infer {{ warmup 500 {{ {kernel}; }} repeat 60000 {{ {kernel}; mh(one(@x)); collect k; }} }}"
+        );
+        let first: Vec<f64> = run(&text, 1, 2)["k"].iter().map(|k| f64::from(u8::from(*k == 0.0))).collect();
+        assert_mean(kernel, &first, there / (there + 2.0 * gone), 0.02);
+    }
+}

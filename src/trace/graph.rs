@@ -73,6 +73,10 @@ pub(crate) struct Graph {
     /// The log prior of what this update drew from the prior, and of what it would have to draw to be undone.
     pub drawn: ExactSum,
     pub undrawn: ExactSum,
+    /// Elements of choices that this update drew anew: their prior density before it is in `undrawn`.
+    pub redrawn: Vec<(NodeId, u32)>,
+    /// The choices that vanished, with their scores at that time. Others may have been scored under other parameters before they did.
+    pub retired: Vec<(NodeId, f64)>,
     /// The choices this update removed: node, address hash and stored value.
     pub removed: Vec<(NodeId, u64, Datum)>,
     /// The log Jacobians of choices set through the unconstrained space.
@@ -124,6 +128,8 @@ impl Graph {
             likelihood: ExactSum::default(),
             drawn: ExactSum::default(),
             undrawn: ExactSum::default(),
+            redrawn: Vec::new(),
+            retired: Vec::new(),
             removed: Vec::new(),
             jacobian: ExactSum::default(),
             appeared: 0,

@@ -80,6 +80,8 @@ impl Graph {
         };
         self.drawn = ExactSum::default();
         self.undrawn = ExactSum::default();
+        self.redrawn.clear();
+        self.retired.clear();
         self.jacobian = ExactSum::default();
         self.removed.clear();
         self.appeared = 0;
@@ -234,13 +236,18 @@ impl Graph {
         }
         let mut users = std::mem::take(&mut self.outside[list].users);
         users.sort_unstable();
-        users.dedup();
+        // One entry for each reading, as each is let go by itself.
+        let (mut user, mut readings) = (NONE, 0);
         users.retain(|u| {
-            let mut reads = false;
-            if self.nodes[*u as usize].state != State::Empty {
-                self.each_dep(code, *u, |d, outside| reads |= outside && d == n);
+            if *u != user {
+                (user, readings) = (*u, 0);
+                if self.nodes[user as usize].state != State::Empty {
+                    self.each_dep(code, user, |d, outside| readings += u32::from(outside && d == n));
+                }
             }
-            reads
+            let kept = readings > 0;
+            readings = readings.saturating_sub(1);
+            kept
         });
         self.outside[list] = Outside { users, gone: 0 };
     }

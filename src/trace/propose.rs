@@ -2,6 +2,7 @@
 
 use super::choices::Target;
 use super::graph::Graph;
+use super::journal::Entry;
 use super::node::*;
 use crate::dist::Datum;
 use crate::num::ExactSum;
@@ -112,12 +113,34 @@ impl Graph {
         }
     }
 
+    /// The log prior of what this update would have to draw to be undone: of choices that vanished, as it was before the update.
+    fn undrawn(&self) -> ExactSum {
+        let mut sum = self.undrawn.clone();
+        let mut retired = self.retired.clone();
+        retired.sort_by_key(|(n, _)| *n);
+        if !retired.is_empty() {
+            for entry in &self.journal {
+                let Entry::Node { id, score, state, .. } = entry else { continue };
+                let first = retired.partition_point(|(n, _)| n < id);
+                // What appeared, or was drawn anew, is undone with what that added to `drawn`.
+                if let Some((_, s)) = retired.get_mut(first).filter(|(n, _)| n == id)
+                    && *state != State::Empty
+                    && !self.redrawn.contains(&(*id, NONE))
+                {
+                    *s = *score;
+                }
+            }
+        }
+        retired.iter().for_each(|(_, s)| sum.add(*s));
+        sum
+    }
+
     /// What the current update did to the score.
     pub fn weight(&self, prior: &ExactSum, likelihood: &ExactSum) -> Weight {
         let none = ExactSum::default();
         let log_joint = ExactSum::balance([&self.prior, &self.likelihood, &none], [prior, likelihood, &none]);
         let log_weight =
-            ExactSum::balance([&self.prior, &self.likelihood, &self.drawn], [prior, likelihood, &self.undrawn]);
+            ExactSum::balance([&self.prior, &self.likelihood, &self.drawn], [prior, likelihood, &self.undrawn()]);
         Weight {
             log_weight,
             log_joint,

@@ -305,6 +305,7 @@ impl Graph {
         if from_prior {
             self.undrawn.add(old_score);
             self.drawn.add(score);
+            self.redrawn.push((n, NONE));
         }
         self.nodes[n as usize].score = score;
         self.nodes[n as usize].flags &= !TARGET;
@@ -361,6 +362,7 @@ impl Graph {
                     if matches!(change, Change::Resample | Change::White(_)) {
                         self.undrawn.add(side.scores[i]);
                         self.drawn.add(one.log_density_stored(&new));
+                        self.redrawn.push((n, i as u32));
                     }
                     *x = new;
                     changed = true;
@@ -413,15 +415,20 @@ impl Graph {
         match self.nodes[n as usize].side.as_deref() {
             Some(Side::Choice(c)) if c.elements != NONE => {
                 let scores = c.scores.clone();
-                for s in scores {
+                let before = self.journal.iter().find_map(|e| match e {
+                    Entry::Choice(m, side) if *m == n => Some(side.scores.clone()),
+                    _ => None,
+                });
+                let before = before.filter(|b| b.len() == scores.len()).unwrap_or_else(|| scores.clone());
+                for (i, (s, before)) in scores.into_iter().zip(before).enumerate() {
                     self.prior.sub(s);
-                    self.undrawn.add(s);
+                    self.undrawn.add(if self.redrawn.contains(&(n, i as u32)) { s } else { before });
                 }
             }
             _ => {
                 let score = self.nodes[n as usize].score;
                 self.prior.sub(score);
-                self.undrawn.add(score);
+                self.retired.push((n, score));
             }
         }
         self.unregister_choice(n, hash);
