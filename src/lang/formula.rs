@@ -78,9 +78,7 @@ pub struct Formula {
     pub steps: Box<[Step]>,
     /// The computations that depend on the value; they must not be read from other blocks.
     pub computations: Box<[Slot]>,
-    /// Whether a selection depends on the value.
-    pub chooses: bool,
-    /// In which registers they are left, if they are computed.
+    /// In which registers computations are left, if they are computed: these and those that alternatives ask for.
     pub results: Box<[(Slot, u8)]>,
     /// What the alternatives of its selections hold: who else holds it keeps it when a selection takes the other alternative.
     pub held: Box<[Held]>,
@@ -101,7 +99,6 @@ impl Formula {
             known: vec![None; ops.len()],
             registers: 1,
             inside: false,
-            chooses: false,
             results: Vec::new(),
             held: Vec::new(),
             computed: Vec::new(),
@@ -110,13 +107,12 @@ impl Formula {
         let is_score = |s: &Slot| matches!(ops[*s as usize], Op::Draw { .. } | Op::Observe { .. } | Op::Factor { .. });
         let (scores, computations): (Vec<Slot>, Vec<Slot>) = dependents.into_iter().partition(is_score);
         scores.into_iter().try_for_each(|slot| compiler.score(slot))?;
-        let Compiler { steps, chooses, results, mut held, computed, .. } = compiler;
+        let Compiler { steps, results, mut held, computed, .. } = compiler;
         let operands: Vec<Operand> = held.iter().map(|h| h.operand).collect();
         held.iter_mut().for_each(|h| h.times = operands.iter().filter(|o| **o == h.operand).count() as u32);
         Some(Formula {
             steps: steps.into(),
             computations: computations.into(),
-            chooses,
             results: results.into(),
             held: held.into(),
             computed: computed.into(),
@@ -136,7 +132,6 @@ struct Compiler<'a> {
     registers: usize,
     /// Whether the next step is inside an alternative: what it reads may not be evaluated.
     inside: bool,
-    chooses: bool,
     results: Vec<(Slot, u8)>,
     held: Vec<Held>,
     computed: Vec<Slot>,
@@ -209,6 +204,7 @@ impl Compiler<'_> {
         self.known = known;
         self.land(recall);
         self.known[slot as usize] = Some(into);
+        self.results.push((slot, into));
         Some(Source::Register(into))
     }
 
@@ -255,7 +251,6 @@ impl Compiler<'_> {
                 self.land(branch);
                 self.alternative(otherwise, into)?;
                 self.land(go);
-                self.chooses |= chosen;
                 if chosen {
                     self.hold(slot, true, then)?;
                     self.hold(slot, false, otherwise)?;

@@ -5,6 +5,7 @@
 //! in order instead of marking and asking.
 
 use super::code::{DistSpec, Op, Operand, Slot, SlotFacts, Spread};
+use smallvec::SmallVec;
 
 /// The longest list worth keeping.
 const LONGEST: usize = 64;
@@ -16,12 +17,41 @@ pub(super) fn spread(ops: &[Op], slots: &[SlotFacts], from: Slot) -> Option<Spre
     if order.iter().any(|s| matches!(&ops[*s as usize], Op::Draw { keys, .. } if !keys.is_empty())) {
         return None;
     }
-    let local = |s: &Slot| match &ops[*s as usize] {
-        Op::Select { then, otherwise, .. } => ![then, otherwise].iter().any(|o| matches!(o, Operand::Outer { .. })),
-        _ => slots[*s as usize].reads.as_ref().is_some_and(|reads| reads.iter().all(|(up, _)| *up == 0)),
-    };
-    let is_closed = order.iter().all(local);
+    let is_closed = reads_inside(ops, from, &order);
     Some(Spread { slots: order.into(), is_closed })
+}
+
+/// Whether all that these dependents of a slot read is in order when they run: in their list, or of this block through and
+/// through. What comes from frames may have changed because they read what changes here.
+fn reads_inside(ops: &[Op], from: Slot, order: &[Slot]) -> bool {
+    let mut seen = vec![false; ops.len()];
+    order.iter().chain([&from]).for_each(|s| seen[*s as usize] = true);
+    let mut open = order.to_vec();
+    while let Some(slot) = open.pop() {
+        let op = &ops[slot as usize];
+        let mut read: SmallVec<[Operand; 8]> = SmallVec::new();
+        op.operands(|o| read.push(o));
+        if let Op::Select { then, otherwise, .. } = op {
+            read.extend([*then, *otherwise]);
+        }
+        for o in read {
+            let s = match o {
+                Operand::Const(_) => continue,
+                Operand::Outer { .. } => return false,
+                Operand::Local(s) => s,
+            };
+            if std::mem::replace(&mut seen[s as usize], true) {
+                continue;
+            }
+            match &ops[s as usize] {
+                Op::Param { .. } | Op::Item | Op::Accumulator | Op::Closure(_) => {}
+                Op::Prim { .. } | Op::Array(_) | Op::Record { .. } | Op::Index { .. } => open.push(s),
+                Op::Select { .. } | Op::Draw { .. } => open.push(s),
+                _ => return false,
+            }
+        }
+    }
+    true
 }
 
 /// What depends on a slot in its block, each after what it reads, up to and including observations and other choices, if that

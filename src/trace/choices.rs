@@ -59,6 +59,12 @@ impl Members {
 
     /// Enters what this update changed, and gives the list as it was.
     fn apply(&mut self) -> Option<Listed> {
+        let (hashes, targets) = &self.listed;
+        self.removed.retain(|(hash, node)| {
+            let first = hashes.partition_point(|h| h < hash);
+            let mut same = first..first + hashes[first..].iter().take_while(|h| *h == hash).count();
+            same.any(|i| targets[i].node == *node)
+        });
         if self.added.is_empty() && self.removed.is_empty() {
             return None;
         }
@@ -91,6 +97,11 @@ impl Members {
                 hashes.insert(at, hash);
                 targets.insert(at, target);
             }
+        }
+        // What vanished and appeared again left it as it was: sweeps go by whether it is the same list.
+        if self.listed == before {
+            self.listed = before;
+            return None;
         }
         Some(before)
     }

@@ -22,10 +22,10 @@ pub(crate) type Formulas<'c> = SmallVec<[Placed<'c>; 4]>;
 #[derive(Clone, Copy)]
 pub(crate) struct Placed<'c> {
     /// The first node of the frame.
-    base: NodeId,
+    pub base: NodeId,
     /// The node that has the value: the choice, or an element of a container that is the choice.
-    entry: NodeId,
-    formula: &'c Formula,
+    pub entry: NodeId,
+    pub formula: &'c Formula,
 }
 
 /// The most other frames that may read the choice.
@@ -33,7 +33,7 @@ const READERS: usize = 4;
 
 /// A value in a formula.
 #[derive(Clone, Copy)]
-enum Register<'a> {
+pub(crate) enum Register<'a> {
     Num(f64),
     Bool(bool),
     Other(&'a Value),
@@ -47,12 +47,12 @@ pub(crate) struct Evaluation<'a, const N: usize> {
     registers: [Register<'a>; N],
     /// A bit for each register that was filled.
     filled: u32,
-    /// Whether a selection took its other alternative.
-    chose: bool,
+    /// The selections that took their other alternative.
+    pub turned: SmallVec<[NodeId; 4]>,
     /// The scores, by node.
-    scores: SmallVec<[(NodeId, f64); 8]>,
-    prior: ExactSum,
-    likelihood: ExactSum,
+    pub scores: SmallVec<[(NodeId, f64); 8]>,
+    pub prior: ExactSum,
+    pub likelihood: ExactSum,
 }
 
 impl Graph {
@@ -107,55 +107,6 @@ impl Graph {
         Evaluation::new(self, code, [Register::Num(0.0); REGISTERS])
     }
 
-    /// Gives the choice another value for good, where formulas cover all that follows and nothing is held or let go; false,
-    /// and nothing is done, otherwise.
-    pub fn assign(&mut self, code: &Code, target: NodeId, dist: &Dist, value: &Datum) -> bool {
-        let Some(formulas) = self.formulas(code, target) else { return false };
-        let Some(at) = Register::of_datum(value) else { return false };
-        // A truth value that a selection depends on nearly always makes it take the other alternative.
-        if matches!(at, Register::Bool(_)) && formulas.iter().any(|placed| placed.formula.chooses) {
-            return false;
-        }
-        let mut values: SmallVec<[(NodeId, Value); 16]> = SmallVec::new();
-        let mut e = self.evaluation(code);
-        e.begin(at);
-        for placed in &formulas {
-            if e.run(placed, formulas.len() == 1).is_none() || e.chose {
-                return false;
-            }
-            values.push((placed.entry, at.to_value()));
-            for slot in &placed.formula.computations {
-                if e.node(*slot).state == State::Clean {
-                    let mut results = placed.formula.results.iter();
-                    let Some((_, r)) = results.find(|(s, r)| s == slot && e.filled & (1 << r) != 0) else {
-                        return false;
-                    };
-                    values.push((placed.base + slot, e.registers[*r as usize].to_value()));
-                }
-            }
-        }
-        let Evaluation { scores, prior, likelihood, .. } = e;
-        if scores.iter().any(|(n, _)| matches!(self.nodes[*n as usize].side.as_deref(), Some(Side::Total(_)))) {
-            return false;
-        }
-        self.revision += 1;
-        let score = dist.log_density_stored(value);
-        self.prior.sub(self.nodes[target as usize].score);
-        self.prior.add(score);
-        self.prior.merge(&prior);
-        self.likelihood.merge(&likelihood);
-        self.nodes[target as usize].score = score;
-        for (n, value) in values {
-            self.nodes[n as usize].value = value;
-        }
-        for (n, score) in scores {
-            self.nodes[n as usize].score = score;
-        }
-        true
-    }
-}
-
-impl Graph {
     /// The distribution of a choice whose parameters are single numbers, or arrays as they are.
     pub fn simple_dist(&self, code: &Code, n: NodeId) -> Option<Dist> {
         let Op::Draw { dist: DistSpec::Family { builtin, args }, .. } = self.op(code, n) else { return None };
@@ -181,16 +132,16 @@ impl<'a> Evaluation<'a, REGISTERS> {
     }
 
     /// Begins with a value of the choice.
-    fn begin(&mut self, value: Register<'a>) {
+    pub fn begin(&mut self, value: Register<'a>) {
         self.registers[0] = value;
-        self.chose = false;
+        self.turned.clear();
         self.scores.clear();
         self.prior = ExactSum::default();
         self.likelihood = ExactSum::default();
     }
 
     /// Runs a formula. `may_choose`: selections may take their other alternative.
-    fn run(&mut self, placed: &Placed, may_choose: bool) -> Option<()> {
+    pub fn run(&mut self, placed: &Placed, may_choose: bool) -> Option<()> {
         let formula = placed.formula;
         (self.base, self.filled) = (placed.base, 1);
         let mut next = 0;
@@ -224,10 +175,12 @@ impl<'a> Evaluation<'a, REGISTERS> {
                     let holds = self.truth(cond)?;
                     let node = self.node(slot);
                     let other = node.state == State::Clean && holds != (node.flags & OTHERWISE == 0);
-                    if other && !self.chose && !(may_choose && self.can_choose(formula)) {
-                        return None;
+                    if other && !self.turned.contains(&(self.base + slot)) {
+                        if self.turned.is_empty() && !(may_choose && self.can_choose(formula)) {
+                            return None;
+                        }
+                        self.turned.push(self.base + slot);
                     }
-                    self.chose |= other;
                     if !holds {
                         next = otherwise as usize;
                     }
@@ -261,6 +214,16 @@ impl<'a> Evaluation<'a, REGISTERS> {
             }
         }
         Some(())
+    }
+
+    /// Whether a register was filled.
+    pub fn is_filled(&self, r: u8) -> bool {
+        self.filled & (1 << r) != 0
+    }
+
+    /// What is in a register.
+    pub fn register(&self, r: u8) -> Register<'a> {
+        self.registers[r as usize]
     }
 
     #[inline(always)]
@@ -325,7 +288,7 @@ impl<'a, const N: usize> Evaluation<'a, N> {
             base: 0,
             registers,
             filled: 0,
-            chose: false,
+            turned: SmallVec::new(),
             scores: SmallVec::new(),
             prior: ExactSum::default(),
             likelihood: ExactSum::default(),
@@ -369,7 +332,7 @@ impl<'a, const N: usize> Evaluation<'a, N> {
 }
 
 impl<'a> Register<'a> {
-    fn of_datum(x: &Datum) -> Option<Self> {
+    pub fn of_datum(x: &Datum) -> Option<Self> {
         match x {
             Datum::Num(x) => Some(Register::Num(*x)),
             Datum::Bool(b) => Some(Register::Bool(*b)),
@@ -377,7 +340,7 @@ impl<'a> Register<'a> {
         }
     }
 
-    fn to_value(self) -> Value {
+    pub fn to_value(self) -> Value {
         match self {
             Register::Num(x) => Value::Num(x),
             Register::Bool(b) => Value::Bool(b),

@@ -4,6 +4,7 @@
 //! incremental update, *commit* or *roll back*. A choice that no observation asks for is not part of a trace; it is drawn
 //! when a [`query`](Trace::query) asks for it, from its prior given the rest.
 
+mod assign;
 mod choices;
 mod demand;
 mod eval;

@@ -93,12 +93,6 @@ impl Trace {
         }
         Ok(true)
     }
-
-    /// Gives a choice with this distribution another value for good, where that changes no structure and can be done in short;
-    /// false, and nothing is done, otherwise: then an update does it.
-    pub(crate) fn assign(&mut self, target: Target, dist: &Dist, value: &Datum) -> bool {
-        self.update.is_none() && target.element == NONE && self.graph.assign(&self.code, target.node, dist, value)
-    }
 }
 
 impl Graph {

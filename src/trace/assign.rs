@@ -1,0 +1,164 @@
+//! Moves of a choice by formulas: they tell the values and scores that follow, and which selections take their other
+//! alternative. The state is the one that an update would lead to.
+
+use super::Trace;
+use super::choices::Target;
+use super::formula::Register;
+use super::graph::Graph;
+use super::node::*;
+use crate::dist::{Datum, Dist};
+use crate::lang::code::{Code, Op, Operand};
+use crate::lang::value::Value;
+use smallvec::SmallVec;
+
+/// What is to be done to the nodes that depend on a choice.
+#[derive(Default)]
+struct Following {
+    values: SmallVec<[(NodeId, Value); 8]>,
+    /// The values of computations that selections come to ask for.
+    fresh: SmallVec<[(NodeId, Value); 8]>,
+    /// Computations that no score asks for any more.
+    unasked: SmallVec<[NodeId; 4]>,
+    /// Selections that take their other alternative.
+    turned: SmallVec<[NodeId; 4]>,
+}
+
+impl Trace {
+    /// Gives a choice with this distribution another value for good, where that changes no structure and can be done in short;
+    /// false, and nothing is done, otherwise: then an update does it.
+    pub(crate) fn assign(&mut self, target: Target, dist: &Dist, value: &Datum) -> bool {
+        self.update.is_none() && target.element == NONE && self.graph.assign(&self.code, target.node, dist, value)
+    }
+}
+
+impl Graph {
+    /// See [`Trace::assign`].
+    fn assign(&mut self, code: &Code, target: NodeId, dist: &Dist, value: &Datum) -> bool {
+        let Some(formulas) = self.formulas(code, target) else { return false };
+        let Some(at) = Register::of_datum(value) else { return false };
+        let mut following = Following::default();
+        let mut e = self.evaluation(code);
+        e.begin(at);
+        for placed in &formulas {
+            if e.run(placed, formulas.len() == 1).is_none() {
+                return false;
+            }
+            following.values.push((placed.entry, at.to_value()));
+            if !e.turned.is_empty() {
+                for (slot, r) in placed.formula.results.iter().filter(|(_, r)| e.is_filled(*r)) {
+                    let n = placed.base + slot;
+                    if self.nodes[n as usize].state == State::Empty {
+                        following.fresh.push((n, e.register(*r).to_value()));
+                    }
+                }
+            }
+            for slot in &placed.formula.computations {
+                let n = placed.base + slot;
+                if self.nodes[n as usize].state == State::Clean {
+                    let mut results = placed.formula.results.iter();
+                    match results.find(|(s, r)| s == slot && e.is_filled(*r)) {
+                        Some((_, r)) => following.values.push((n, e.register(*r).to_value())),
+                        None => following.unasked.push(n),
+                    }
+                }
+            }
+        }
+        following.turned = e.turned;
+        let (scores, prior, likelihood) = (e.scores, e.prior, e.likelihood);
+        let is_total = |n: NodeId| matches!(self.nodes[n as usize].side.as_deref(), Some(Side::Total(_)));
+        if scores.iter().any(|(n, _)| is_total(*n)) || !self.follow(code, following) {
+            return false;
+        }
+        self.revision += 1;
+        let score = dist.log_density_stored(value);
+        self.prior.sub(self.nodes[target as usize].score);
+        self.prior.add(score);
+        self.prior.merge(&prior);
+        self.likelihood.merge(&likelihood);
+        self.nodes[target as usize].score = score;
+        for (n, score) in scores {
+            self.nodes[n as usize].score = score;
+        }
+        true
+    }
+
+    /// Gives nodes their new values; false, and nothing is done, if an update has to decide.
+    fn follow(&mut self, code: &Code, following: Following) -> bool {
+        if following.turned.is_empty() {
+            for (n, value) in following.values {
+                self.nodes[n as usize].value = value;
+            }
+            return following.unasked.is_empty();
+        }
+        let before = self.begin();
+        for (n, value) in following.values {
+            self.save(n);
+            self.nodes[n as usize].value = value;
+        }
+        let turned = self.turn(code, &following.turned, &following.fresh);
+        let is_asked = |n: &NodeId| self.nodes[*n as usize].state != State::Empty;
+        if turned.is_none() || following.unasked.iter().any(is_asked) {
+            self.rollback(code, before);
+            return false;
+        }
+        self.commit(code);
+        true
+    }
+
+    /// Lets selections hold their other alternatives in place of those they held; `None` if those cannot be computed.
+    fn turn(&mut self, code: &Code, selections: &[NodeId], fresh: &[(NodeId, Value)]) -> Option<()> {
+        // What one takes up before what another lets go: it may be the same.
+        for n in selections {
+            let (taken, _) = self.ways(code, *n)?;
+            if let Some(d) = self.resolve(self.nodes[*n as usize].frame, taken) {
+                self.take_up(code, d, *n, !matches!(taken, Operand::Local(_)), fresh)?;
+            }
+        }
+        for n in selections {
+            let (_, left) = self.ways(code, *n)?;
+            if let Some(d) = self.resolve(self.nodes[*n as usize].frame, left) {
+                self.release(d, !matches!(left, Operand::Local(_)));
+            }
+            self.nodes[*n as usize].flags ^= OTHERWISE;
+        }
+        self.sweep(code);
+        Some(())
+    }
+
+    /// Takes hold of a node, and of what it reads if nothing has asked for it so far.
+    fn take_up(
+        &mut self,
+        code: &Code,
+        d: NodeId,
+        user: NodeId,
+        outside: bool,
+        fresh: &[(NodeId, Value)],
+    ) -> Option<()> {
+        if self.nodes[d as usize].state == State::Empty {
+            let known = fresh.iter().find(|(n, _)| *n == d && !matches!(self.op(code, d), Op::Select { .. }));
+            match known {
+                Some((_, value)) => {
+                    self.save(d);
+                    let node = &mut self.nodes[d as usize];
+                    node.value = value.clone();
+                    node.changed = self.epoch;
+                    node.state = State::Clean;
+                    node.flags |= HELD;
+                    let mut read: SmallVec<[(NodeId, bool); 8]> = SmallVec::new();
+                    self.each_dep(code, d, |r, outside| read.push((r, outside)));
+                    read.into_iter().try_for_each(|(r, outside)| self.take_up(code, r, d, outside, fresh))?;
+                }
+                None => self.demand(code, d).ok()?,
+            }
+        }
+        self.acquire(d, user, outside);
+        Some(())
+    }
+
+    /// The alternative that a selection does not hold, and the one that it does.
+    fn ways(&self, code: &Code, n: NodeId) -> Option<(Operand, Operand)> {
+        let Op::Select { then, otherwise, .. } = self.op(code, n) else { return None };
+        let is_first = self.nodes[n as usize].flags & OTHERWISE == 0;
+        Some(if is_first { (*otherwise, *then) } else { (*then, *otherwise) })
+    }
+}
