@@ -1,8 +1,8 @@
 //! What one transition of a local choice costs as a program grows: outlier flags of a regression, hidden states of a chain.
 //!
-//!     cargo run --release --example transition_cost -- MODEL N TRANSITIONS
+//!     cargo run --release --example transition_cost -- MODEL N TRANSITIONS [sweep]
 //!
-//! MODEL is `linreg` or `hmm` (programs of `benches/peers`, without their plans). Prints processor times of the one thread, and
+//! MODEL is `linreg` or `hmm` (programs of `benches/peers`, without their plans). Choices come at random, or by `sweep` one after the other. Prints processor times of the one thread, and
 //! memory. For instructions, run it twice under callgrind with different TRANSITIONS and take the difference.
 
 mod clock;
@@ -19,7 +19,10 @@ const WARM: u64 = 1000;
 
 fn main() -> Result<(), Box<dyn Error>> {
     let args: Vec<String> = std::env::args().skip(1).collect();
-    let [model, n, count] = &args[..] else { return Err("usage: transition_cost linreg|hmm N TRANSITIONS".into()) };
+    let [model, n, count, order @ ..] = &args[..] else {
+        return Err("usage: transition_cost linreg|hmm N TRANSITIONS [sweep]".into());
+    };
+    let pick = if order.first().is_some_and(|o| o == "sweep") { Pick::Each } else { Pick::One };
     let (n, count): (usize, u64) = (n.parse()?, count.parse()?);
     let begun = processor_seconds();
     let (model, tag) = match model.as_str() {
@@ -31,7 +34,7 @@ fn main() -> Result<(), Box<dyn Error>> {
     let mut trace = model.simulate(1, 0)?;
     let started = processor_seconds();
     let selector = Selector::Tag { name: tag.into(), value: None };
-    let mut kernel = Gibbs::new(Scope { selector, pick: Pick::One });
+    let mut kernel = Gibbs::new(Scope { selector, pick });
     let warm = WARM.min(count);
     run(&mut kernel, &mut trace, 0..warm)?;
     let ready = processor_seconds();
@@ -48,9 +51,14 @@ fn main() -> Result<(), Box<dyn Error>> {
 
 /// Steps of a kernel; how many moved the choice.
 fn run(kernel: &mut dyn Kernel, trace: &mut Trace, steps: std::ops::Range<u64>) -> Result<u64, Box<dyn Error>> {
-    let mut moved = 0;
+    let (mut moved, mut member, mut members) = (0, 0, 0);
     for step in steps {
-        let outcome = kernel.step(trace, &At::new(1, 0, step)).map_err(|e| e.to_string())?;
+        member += 1;
+        if member >= members {
+            (member, members) = (0, kernel.sweep(trace).unwrap_or(0));
+        }
+        let at = At { member, ..At::new(1, 0, step) };
+        let outcome = kernel.step(trace, &at).map_err(|e| e.to_string())?;
         moved += u64::from(outcome.accepted);
     }
     Ok(moved)

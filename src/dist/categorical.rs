@@ -37,22 +37,24 @@ impl Categorical {
 
 /// The sum of valid weights.
 fn total(weights: &[f64]) -> Result<f64, ParamError> {
+    let total: f64 = weights.iter().sum();
+    // What is not finite leaves no finite sum.
+    if total > 0.0 && total.is_finite() && weights.iter().all(|w| *w >= 0.0) {
+        return Ok(total);
+    }
     if let Some(w) = weights.iter().find(|w| !(w.is_finite() && **w >= 0.0)) {
         return Err(ParamError::new(Categorical::NAME, "weights", w, "must be finite and not negative"));
     }
-    let total: f64 = weights.iter().sum();
-    if !(total > 0.0 && total.is_finite()) {
-        return Err(ParamError::new(Categorical::NAME, "weights", total, "must have a positive, finite sum"));
-    }
-    Ok(total)
+    Err(ParamError::new(Categorical::NAME, "weights", total, "must have a positive, finite sum"))
 }
 
 #[inline]
 fn log_probability(weights: &[f64], total: f64, x: f64) -> f64 {
-    if !(x >= 0.0 && x == libm::trunc(x)) {
+    let i = x as usize;
+    if i as f64 != x {
         return f64::NEG_INFINITY;
     }
-    match weights.get(x as usize) {
+    match weights.get(i) {
         Some(w) if *w > 0.0 && total == 1.0 => libm::log(*w),
         Some(w) if *w > 0.0 => libm::log(*w) - libm::log(total),
         _ => f64::NEG_INFINITY,

@@ -50,7 +50,7 @@ impl At {
 
     /// The log weight of an update with the likelihood raised to the power.
     pub fn tempered(&self, w: &Weight) -> f64 {
-        if self.power == 1.0 { w.log_weight } else { w.log_weight - (1.0 - self.power) * w.log_likelihood }
+        w.tempered(self.power)
     }
 }
 

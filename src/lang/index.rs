@@ -54,7 +54,9 @@ fn position(base: &Value, x: f64) -> Result<Value, Fault> {
 
 /// The index that `x` is into so many elements.
 pub(crate) fn place(len: usize, x: f64) -> Option<usize> {
-    (x >= 0.0 && x < len as f64 && x == libm::trunc(x)).then_some(x as usize)
+    // The conversion saturates, and is 0 for NaN: then it does not lead back.
+    let i = x as usize;
+    (i < len && i as f64 == x).then_some(i)
 }
 
 /// The components of `[x, y, z]` by name, as a record.

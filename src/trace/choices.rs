@@ -268,9 +268,9 @@ impl Graph {
             && old != n
         {
             self.choices.suspects.push((old, n));
-            self.journal.push(Entry::AddressShadowed(hash, old));
+            self.note(Entry::AddressShadowed(hash, old));
         }
-        self.journal.push(Entry::ChoiceAdded(n, hash));
+        self.note(Entry::ChoiceAdded(n, hash));
         let needs_facts = self.choices.selections.len() > 1;
         let needs_address = self.choices.selections.iter().any(|m| m.selector.needs_address());
         let mut facts = needs_facts.then(|| self.facts(code, n, needs_address, Some(dist)));
@@ -299,7 +299,7 @@ impl Graph {
     pub fn unregister_choice(&mut self, n: NodeId, hash: u64) {
         if self.choices.by_address.get(&hash) == Some(&n) {
             self.choices.by_address.remove(&hash);
-            self.journal.push(Entry::ChoiceRemoved(n, hash));
+            self.note(Entry::ChoiceRemoved(n, hash));
         }
         for m in &mut self.choices.selections {
             let before = m.added.len();
@@ -314,7 +314,7 @@ impl Graph {
     pub fn settle_choices(&mut self, code: &Code) -> Result<(), Failure> {
         for i in 0..self.choices.selections.len() {
             if let Some(before) = self.choices.selections[i].apply() {
-                self.journal.push(Entry::TargetsReplaced { selection: i as u32, before });
+                self.note(Entry::TargetsReplaced { selection: i as u32, before });
             }
         }
         self.check_duplicates(code)

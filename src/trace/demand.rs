@@ -188,7 +188,7 @@ impl Graph {
             }
             Some(Side::Total(t)) => {
                 let old = std::mem::replace(&mut t.deps, deps);
-                self.journal.push(Entry::TotalDeps(n, old));
+                self.note(Entry::TotalDeps(n, old));
             }
             _ => self.set_side(n, if deps.is_empty() { None } else { Some(Side::Deps(deps)) }),
         }

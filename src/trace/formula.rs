@@ -122,13 +122,20 @@ impl Graph {
 }
 
 impl<'a> Evaluation<'a, REGISTERS> {
-    /// The weight of a value of the choice, relative to the present one; `None` if the formulas do not cover it.
-    pub fn weigh(&mut self, target: NodeId, formulas: &Formulas, dist: &Dist, value: &Datum) -> Option<Weight> {
+    /// The log weight of a value of the choice, relative to the present one, with the likelihood raised to a power; `None` if the formulas do not cover it.
+    pub fn weigh(
+        &mut self,
+        target: NodeId,
+        formulas: &Formulas,
+        dist: &Dist,
+        value: &Datum,
+        power: f64,
+    ) -> Option<f64> {
         self.begin(Register::of_datum(value)?);
         self.prior.sub(self.graph.nodes[target as usize].score);
         self.prior.add(dist.log_density_stored(value));
         formulas.iter().try_for_each(|placed| self.run(placed, formulas.len() == 1))?;
-        Some(Weight::beside(&self.prior, &self.likelihood))
+        Some(Weight::beside(&self.prior, &self.likelihood, power))
     }
 
     /// Begins with a value of the choice.
@@ -253,21 +260,30 @@ impl<'a> Evaluation<'a, REGISTERS> {
 
     /// The log density of a single number or truth value.
     fn log_density(&self, builtin: u32, parameters: &[Source; PARAMETERS], x: Register) -> Option<f64> {
-        let mut read = [Register::Num(0.0); PARAMETERS];
         let builtin = self.code.builtins.get(builtin);
-        let read = read.get_mut(..builtin.args.len())?;
-        for (to, from) in read.iter_mut().zip(parameters) {
-            *to = self.read(*from)?;
-        }
-        match (builtin.scalar, &*read, x) {
-            (_, _, Register::Num(x)) if x.is_nan() => None,
-            (Some(Scalar::Weights { log_probability, .. }), [Register::Other(Value::Array(w))], Register::Num(x)) => {
-                log_probability(w, x)
+        let parameters = parameters.get(..builtin.args.len())?;
+        match (builtin.scalar, x) {
+            (_, Register::Num(x)) if x.is_nan() => None,
+            (Some(Scalar::Family { log_density, .. }), Register::Num(x)) => {
+                let mut space = [0.0; PARAMETERS];
+                let numbers = &mut space[..parameters.len()];
+                for (to, from) in numbers.iter_mut().zip(parameters) {
+                    *to = self.number(*from)?;
+                }
+                log_density(numbers, x)
             }
-            (Some(Scalar::Family { log_density, .. }), _, Register::Num(x)) => {
-                log_density(numbers(read, &mut [0.0; PARAMETERS])?, x)
+            (Some(Scalar::Weights { log_probability, .. }), Register::Num(x)) => {
+                match self.read(*parameters.first()?)? {
+                    Register::Other(Value::Array(weights)) if parameters.len() == 1 => log_probability(weights, x),
+                    _ => None,
+                }
             }
             _ => {
+                let mut space = [Register::Num(0.0); PARAMETERS];
+                let read = &mut space[..parameters.len()];
+                for (to, from) in read.iter_mut().zip(parameters) {
+                    *to = self.read(*from)?;
+                }
                 let dist = family(builtin, read)?;
                 match x {
                     _ if !dist.is_scalar() => None,

@@ -25,13 +25,20 @@ fn compared(text: &str) -> [usize; 2] {
             assert!(dist.support().list_values(&mut values));
             let current = trace.stored(t);
             for value in values.into_iter().filter(|v| Some(v) != current.as_ref()) {
-                let formulas = trace.graph.formulas(&trace.code, t.node);
-                let mut evaluation = trace.graph.evaluation(&trace.code);
-                let by_formula = formulas.and_then(|f| evaluation.weigh(t.node, &f, &dist, &value));
+                let by_formula = {
+                    let formulas = trace.graph.formulas(&trace.code, t.node);
+                    let mut evaluation = trace.graph.evaluation(&trace.code);
+                    let mut weight =
+                        |power| formulas.as_ref().and_then(|f| evaluation.weigh(t.node, f, &dist, &value, power));
+                    weight(1.0).zip(weight(0.3))
+                };
                 let by_update = trace.propose(&[(t, Change::Set(value.clone()))], Draws::default()).unwrap();
-                if let Some(w) = by_formula {
+                if let Some((whole, tempered)) = by_formula {
                     weights += 1;
-                    assert_eq!(format!("{w:?}"), format!("{by_update:?}"), "{} = {value:?}", trace.address(t));
+                    let found = [whole, tempered].map(f64::to_bits);
+                    let expected = [1.0, 0.3].map(|power| by_update.tempered(power).to_bits());
+                    assert_eq!(found, expected, "{} = {value:?}", trace.address(t));
+                    assert_eq!(by_update.appeared + by_update.vanished, 0);
                 }
                 moves += usize::from(same_state(&mut trace, t, &dist, &value));
             }

@@ -208,7 +208,7 @@ impl Graph {
         }
         let block = frame.block as usize;
         let id = self.place_frame(code, frame);
-        self.journal.push(Entry::FrameMade(id));
+        self.note(Entry::FrameMade(id));
         let base = self.frames[id as usize].base;
         for s in &code.blocks[block].effects {
             self.nodes[(base + s) as usize].refs = 1;
@@ -375,7 +375,7 @@ impl Graph {
 
     /// Takes hold of a node.
     pub fn acquire(&mut self, dep: NodeId, user: NodeId, outside: bool) {
-        self.journal.push(Entry::Acquired(dep, outside));
+        self.note(Entry::Acquired(dep, outside));
         self.nodes[dep as usize].refs += 1;
         if outside {
             let list = match self.nodes[dep as usize].outside {
@@ -398,7 +398,7 @@ impl Graph {
 
     /// Lets go of a node; what nothing holds any more is emptied at the end of the update.
     pub fn release(&mut self, dep: NodeId, outside: bool) {
-        self.journal.push(Entry::Released(dep, outside));
+        self.note(Entry::Released(dep, outside));
         let node = &mut self.nodes[dep as usize];
         node.refs -= 1;
         if node.refs == 0 {
@@ -421,7 +421,7 @@ impl Graph {
         }
         frame.attached = false;
         let (block, base) = (frame.block as usize, frame.base);
-        self.journal.push(Entry::FrameDetached(id));
+        self.note(Entry::FrameDetached(id));
         self.detached.push(id);
         for s in &code.blocks[block].effects {
             self.release(base + s, false);
@@ -463,7 +463,7 @@ impl Graph {
         self.drop_structure(code, n);
         let node = &mut self.nodes[n as usize];
         node.state = State::Empty;
-        node.flags = 0;
+        node.flags &= SAVED;
         node.value = Value::Unit;
         node.score = 0.0;
     }
@@ -490,7 +490,7 @@ impl Graph {
             Side::Memo(m) => m.entries.values().for_each(|(f, _)| self.detach(code, *f)),
             _ => {}
         }
-        self.journal.push(Entry::Side(n, Some(Box::new(side))));
+        self.note(Entry::Side(n, Some(Box::new(side))));
     }
 
     /// Replaces a node's side without a journal entry.
@@ -501,7 +501,7 @@ impl Graph {
     /// Replaces a node's side, to be restored on roll-back.
     pub fn set_side(&mut self, n: NodeId, side: Option<Side>) {
         let old = std::mem::replace(&mut self.nodes[n as usize].side, side.map(Box::new));
-        self.journal.push(Entry::Side(n, old));
+        self.note(Entry::Side(n, old));
     }
 
     /// An error at a node.

@@ -73,7 +73,6 @@ impl Graph {
             None => {
                 for n in &mut self.nodes {
                     n.changed = 0;
-                    n.touched = 0;
                 }
                 1
             }
@@ -94,11 +93,18 @@ impl Graph {
         self.journal.iter().filter_map(|e| if let Entry::Node { id, .. } = e { Some(*id) } else { None })
     }
 
+    /// Notes a mutation. A first run is never undone.
+    #[inline]
+    pub fn note(&mut self, entry: Entry) {
+        if !self.starting {
+            self.journal.push(entry);
+        }
+    }
+
     /// Saves a node's plain fields, once an update.
     pub fn save(&mut self, n: NodeId) {
         let node = &mut self.nodes[n as usize];
-        if node.touched != self.epoch {
-            node.touched = self.epoch;
+        if node.flags & SAVED == 0 && !self.starting {
             self.journal.push(Entry::Node {
                 id: n,
                 value: node.value.clone(),
@@ -108,13 +114,20 @@ impl Graph {
                 state: node.state,
                 flags: node.flags,
             });
+            node.flags |= SAVED;
         }
     }
 
     /// Keeps the update.
     pub fn commit(&mut self, code: &Code) {
         self.revision += 1;
-        self.journal.clear();
+        let mut journal = std::mem::take(&mut self.journal);
+        for entry in journal.drain(..) {
+            if let Entry::Node { id, .. } = entry {
+                self.nodes[id as usize].flags &= !SAVED;
+            }
+        }
+        self.journal = journal;
         let detached = std::mem::take(&mut self.detached);
         for f in &detached {
             self.free_frame(code, *f);

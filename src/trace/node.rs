@@ -44,11 +44,21 @@ pub(crate) const IMPROPER: u8 = 8;
 /// The node is a selection that reads its second alternative.
 pub(crate) const OTHERWISE: u8 = 16;
 
-/// A node.
+/// The node was saved to the journal in this update.
+pub(crate) const SAVED: u8 = 32;
+
+/// A node: one cache line, with what is read most in front.
 #[derive(Clone, Debug, Default)]
+#[repr(C, align(64))]
 pub(crate) struct Node {
     /// Its value; `nothing` while empty.
     pub value: Value,
+    /// How far its value can be trusted.
+    pub state: State,
+    /// [`HELD`], [`TARGET`], [`WAS_STALE`], [`IMPROPER`], [`OTHERWISE`], [`SAVED`].
+    pub flags: u8,
+    /// Its operation, by index in [`crate::lang::code::Code::ops`].
+    pub op: u32,
     /// What it adds to the log joint, when that is one term.
     pub score: f64,
     /// What only structural nodes and vector choices need.
@@ -57,19 +67,13 @@ pub(crate) struct Node {
     pub refs: u32,
     /// The epoch in which its value last changed.
     pub changed: u32,
-    /// The epoch in which it was last saved to the journal.
-    pub touched: u32,
     /// Its frame.
     pub frame: FrameId,
-    /// Its operation, by index in [`crate::lang::code::Code::ops`].
-    pub op: u32,
     /// Its list of users in other frames.
     pub outside: u32,
-    /// How far its value can be trusted.
-    pub state: State,
-    /// [`HELD`], [`TARGET`], [`WAS_STALE`], [`IMPROPER`], [`OTHERWISE`].
-    pub flags: u8,
 }
+
+const _: () = assert!(size_of::<Node>() == 64);
 
 /// What only some nodes need.
 #[derive(Clone, Debug)]
@@ -274,7 +278,7 @@ pub(crate) struct Frame {
 #[derive(Clone, Debug, Default)]
 pub(crate) struct Outside {
     /// The users; some may have gone.
-    pub users: Vec<NodeId>,
+    pub users: SmallVec<[NodeId; 4]>,
     /// How many have.
     pub gone: u32,
 }

@@ -139,7 +139,7 @@ impl Trace {
 impl Graph {
     fn put_observed(&mut self, hash: u64, value: Value) {
         let old = Arc::make_mut(&mut self.observed).insert(hash, value);
-        self.journal.push(Entry::Observed(hash, old));
+        self.note(Entry::Observed(hash, old));
     }
 
     /// Undoes [`Graph::put_observed`].

@@ -52,8 +52,8 @@ impl From<Failure> for Obstacle {
 }
 
 impl Trace {
-    /// The weights that the values of a choice with this distribution would have in an update, each relative to the present state (that of the
-    /// `current` one is 0); `None` for values that the program does not have. False if that takes updates, since structure depends on the choice.
+    /// The log weights that the values of a choice with this distribution would have in an update, each relative to the present state (that
+    /// of the `current` one is 0), with the likelihood raised to a power; `None` for values that the program does not have. False if that takes updates, since structure depends on the choice.
     pub(crate) fn weigh_values(
         &self,
         target: Target,
@@ -61,7 +61,8 @@ impl Trace {
         values: &[Datum],
         current: usize,
         peek: &mut Peek,
-        mut weight: impl FnMut(Option<Weight>),
+        power: f64,
+        mut weight: impl FnMut(Option<f64>),
     ) -> TraceResult<bool> {
         let g = &self.graph;
         if self.update.is_some() || target.element != NONE {
@@ -72,11 +73,11 @@ impl Trace {
         let mut peeked = false;
         for (i, v) in values.iter().enumerate() {
             if i == current {
-                weight(Some(Weight::default()));
+                weight(Some(0.0));
                 continue;
             }
             if let Some(f) = &formulas
-                && let Some(w) = evaluation.weigh(target.node, f, dist, v)
+                && let Some(w) = evaluation.weigh(target.node, f, dist, v, power)
             {
                 weight(Some(w));
                 continue;
@@ -85,7 +86,7 @@ impl Trace {
                 return Ok(false);
             }
             peeked = true;
-            match g.peek(&self.code, peek, dist, v) {
+            match g.peek(&self.code, peek, dist, v, power) {
                 Ok(w) => weight(Some(w)),
                 Err(Obstacle::Fault(e)) if e.is_recoverable() => weight(None),
                 Err(_) => return Ok(false),
@@ -153,8 +154,8 @@ impl Graph {
         whole && matches!(node.value, Value::Num(_) | Value::Bool(_))
     }
 
-    /// The weight of a value of the choice, relative to the present one.
-    pub fn peek(&self, code: &Code, peek: &mut Peek, dist: &Dist, value: &Datum) -> Result<Weight, Obstacle> {
+    /// The log weight of a value of the choice, relative to the present one.
+    fn peek(&self, code: &Code, peek: &mut Peek, dist: &Dist, value: &Datum, power: f64) -> Result<f64, Obstacle> {
         peek.values.truncate(peek.dependent);
         peek.values.iter_mut().for_each(|(_, v)| *v = None);
         peek.released.clear();
@@ -201,7 +202,7 @@ impl Graph {
                 _ => return Err(Obstacle::Unsuitable),
             }
         }
-        Ok(Weight::beside(&prior, &likelihood))
+        Ok(Weight::beside(&prior, &likelihood, power))
     }
 
     fn peek_all(

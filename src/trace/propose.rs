@@ -79,10 +79,15 @@ pub struct Weight {
 }
 
 impl Weight {
-    /// What an update would do that changes these sums by these terms, and no structure.
-    pub(crate) fn beside(prior: &ExactSum, likelihood: &ExactSum) -> Self {
-        let log_joint = ExactSum::of_both(prior, likelihood);
-        Weight { log_weight: log_joint, log_joint, log_likelihood: likelihood.above_nothing(), ..Weight::default() }
+    /// The log weight with the likelihood raised to a power.
+    pub fn tempered(&self, power: f64) -> f64 {
+        if power == 1.0 { self.log_weight } else { self.log_weight - (1.0 - power) * self.log_likelihood }
+    }
+
+    /// The same of an update that changes these sums by these terms, and no structure.
+    pub(crate) fn beside(prior: &ExactSum, likelihood: &ExactSum, power: f64) -> f64 {
+        let log_weight = ExactSum::of_both(prior, likelihood);
+        if power == 1.0 { log_weight } else { log_weight - (1.0 - power) * likelihood.above_nothing() }
     }
 }
 

@@ -23,17 +23,6 @@ pub struct Gibbs {
     peek: Peek,
 }
 
-/// The state that the values of a choice are weighed against.
-#[derive(Clone, Copy, Debug)]
-struct Present {
-    /// The index of the value there.
-    value: usize,
-    /// What picking the choice there costs.
-    ways: f64,
-    /// The lane of value `i` is `first_lane + i`.
-    first_lane: u64,
-}
-
 /// What weighing the values of a choice showed.
 #[derive(Clone, Copy, Debug, Default)]
 struct Weighed {
@@ -51,37 +40,45 @@ impl Gibbs {
         Gibbs { scope, values: Vec::new(), log: Vec::new(), weights: Vec::new(), peek: Peek::default() }
     }
 
-    /// The log weights of all values relative to the present state.
+    /// The log weights of all values relative to the state with value `old`, without updates; `None` if it takes those.
+    fn weigh_beside(
+        &mut self,
+        trace: &Trace,
+        at: &At,
+        target: Target,
+        dist: &Dist,
+        old: usize,
+    ) -> TraceResult<Option<Weighed>> {
+        let mut weighed = Weighed::default();
+        let log = &mut self.log;
+        log.clear();
+        let told = trace.weigh_values(target, dist, &self.values, old, &mut self.peek, at.power, |w| {
+            weighed.failed += u32::from(w.is_none());
+            log.push(w.filter(|w| !w.is_nan()).unwrap_or(f64::NEG_INFINITY));
+        })?;
+        Ok(told.then_some(weighed))
+    }
+
+    /// The same by updates. `ways` is what picking the choice in that state costs, and the lane of value `i` is `first_lane + i`.
     fn weigh(
         &mut self,
         trace: &mut Trace,
         at: &At,
         target: Target,
-        dist: &Dist,
-        present: Present,
+        old: usize,
+        (ways, first_lane): (f64, u64),
     ) -> TraceResult<Weighed> {
         let mut weighed = Weighed::default();
-        let log = &mut self.log;
-        log.clear();
-        let by_peek = trace.weigh_values(target, dist, &self.values, present.value, &mut self.peek, |w| {
-            weighed.failed += u32::from(w.is_none());
-            let weight = w.map_or(f64::NEG_INFINITY, |w| at.tempered(&w));
-            log.push(if weight.is_nan() { f64::NEG_INFINITY } else { weight });
-        })?;
-        if by_peek {
-            return Ok(weighed);
-        }
         self.log.clear();
-        weighed.failed = 0;
         for (i, v) in self.values.iter().enumerate() {
-            if i == present.value {
+            if i == old {
                 self.log.push(0.0);
                 continue;
             }
             let change = [(target, Change::Set(v.clone()))];
-            match recoverable(trace.propose(&change, at.draws(present.first_lane + i as u64)))? {
+            match recoverable(trace.propose(&change, at.draws(first_lane + i as u64)))? {
                 Some(w) => {
-                    let log = at.tempered(&w) + (present.ways - self.scope.ways_back(trace));
+                    let log = at.tempered(&w) + (ways - self.scope.ways_back(trace));
                     self.log.push(if log.is_nan() { f64::NEG_INFINITY } else { log });
                     weighed.structural |= w.appeared > 0 || w.vanished > 0;
                     weighed.pending = Some(i);
@@ -116,8 +113,10 @@ impl Kernel for Gibbs {
         let Some(old) = self.values.iter().position(|v| Some(v) == stored.as_ref()) else {
             return Ok(Outcome::default());
         };
-        let here = Present { value: old, ways: libm::log(n as f64), first_lane: 0 };
-        let forward = self.weigh(trace, at, target, &dist, here)?;
+        let forward = match self.weigh_beside(trace, at, target, &dist, old)? {
+            Some(forward) => forward,
+            None => self.weigh(trace, at, target, old, (libm::log(n as f64), 0))?,
+        };
         let chosen = sample_log(&self.log, &mut self.weights, &mut rng);
         let mut outcome = Outcome { proposals: 1, failed: forward.failed, ..Default::default() }.at(target);
         if chosen == old {
@@ -144,8 +143,7 @@ impl Kernel for Gibbs {
         let removed = trace.removed();
         trace.commit();
         let ways = self.scope.ways_back(trace);
-        let there = Present { value: chosen, ways, first_lane: self.values.len() as u64 };
-        self.weigh(trace, at, target, &dist, there)?;
+        self.weigh(trace, at, target, chosen, (ways, self.values.len() as u64))?;
         trace.rollback();
         // The old state itself stands for the old value: its weight back is minus its weight forth.
         self.log[old] = -forth;

@@ -394,7 +394,7 @@ impl Graph {
         if let Some(Side::Memo(m)) = self.nodes[memo as usize].side.as_deref_mut() {
             m.entries.insert(key.clone(), new);
         }
-        self.journal.push(Entry::Memo(memo, key.clone(), old));
+        self.note(Entry::Memo(memo, key.clone(), old));
         Ok(new.0)
     }
 
@@ -407,7 +407,7 @@ impl Graph {
         if entry.1 == 0 {
             self.idle.push((memo, key.clone()));
         }
-        self.journal.push(Entry::Memo(memo, key.clone(), Some(old)));
+        self.note(Entry::Memo(memo, key.clone(), Some(old)));
     }
 
     /// Drops an entry that is still without calls.
@@ -415,7 +415,7 @@ impl Graph {
         let Some(Side::Memo(m)) = self.nodes[memo as usize].side.as_deref_mut() else { return };
         let Some(&(frame, 0)) = m.entries.get(key) else { return };
         m.entries.remove(key);
-        self.journal.push(Entry::Memo(memo, key.clone(), Some((frame, 0))));
+        self.note(Entry::Memo(memo, key.clone(), Some((frame, 0))));
         self.detach(code, frame);
     }
 }

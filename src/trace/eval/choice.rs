@@ -372,7 +372,7 @@ impl Graph {
         let scores: Vec<f64> = xs.iter().enumerate().map(|(i, x)| dist.element_log_density(i, x)).collect();
         side.scores.iter().for_each(|s| self.prior.sub(*s));
         scores.iter().for_each(|s| self.prior.add(*s));
-        self.journal.push(Entry::Choice(n, Box::new(side)));
+        self.note(Entry::Choice(n, Box::new(side)));
         if let Some(Side::Choice(c)) = self.nodes[n as usize].side.as_deref_mut() {
             c.scores = scores;
         }

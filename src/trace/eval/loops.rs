@@ -260,7 +260,7 @@ impl Graph {
                     Some(j) => {
                         frames[j] = *f;
                         let before = std::mem::replace(&mut self.frames[*f as usize].pass, j as u32);
-                        self.journal.push(Entry::PassMoved(*f, before));
+                        self.note(Entry::PassMoved(*f, before));
                     }
                     None => self.detach(code, *f),
                 }
@@ -333,7 +333,7 @@ impl Graph {
         if let Some(Side::Loop(l)) = self.nodes[owner as usize].side.as_deref_mut() {
             l.frames[pass] = f;
         }
-        self.journal.push(Entry::PassMade(owner, pass as u32));
+        self.note(Entry::PassMade(owner, pass as u32));
         Ok(f)
     }
 }

@@ -53,7 +53,7 @@ impl Graph {
         match self.nodes[n as usize].side.as_deref_mut() {
             Some(Side::Total(t)) => {
                 let old = std::mem::replace(&mut t.sum, sum);
-                self.journal.push(Entry::Sum(n, old));
+                self.note(Entry::Sum(n, old));
             }
             _ => self.set_side(n, Some(Side::Total(Total { sum, deps: Deps::new() }))),
         }
