@@ -52,7 +52,7 @@ impl Gibbs {
         let mut weighed = Weighed::default();
         let log = &mut self.log;
         log.clear();
-        let told = trace.weigh_values(target, dist, &self.values, old, &mut self.peek, at.power, |w| {
+        let told = trace.weigh_values(target, dist, (&self.values, old), &mut self.peek, at.power, |w| {
             weighed.failed += u32::from(w.is_none());
             log.push(w.filter(|w| !w.is_nan()).unwrap_or(f64::NEG_INFINITY));
         })?;
