@@ -1,5 +1,5 @@
-//! Contours and depth of groups of parts, some of which move: the same bits as an earlier, plainer implementation gave, and
-//! the same whatever was drawn before.
+//! Contours and depth of groups of parts, some of which move: the same bits as when they were compared with an earlier, plainer
+//! implementation, and the same whatever was drawn before.
 
 use glam::{DVec3, Vec3};
 use pcadlang::geom::{Affine, Mesh, Solid};
@@ -100,7 +100,7 @@ fn hash(words: impl IntoIterator<Item = u32>, from: u64) -> u64 {
 }
 
 #[test]
-fn contours_and_depth_are_those_of_the_plain_implementation() {
+fn contours_and_depth_are_as_they_were() {
     let mut random = Uniform(41);
     let (mut contours, mut depth, mut pieces) = (0xcbf29ce484222325, 0xcbf29ce484222325, 0);
     for _ in 0..400 {
@@ -112,10 +112,11 @@ fn contours_and_depth_are_those_of_the_plain_implementation() {
         let frame = Frame::render(&solid, &camera, Channels::Depth);
         depth = hash(frame.depth.iter().map(|d| d.to_bits()), depth);
     }
-    // Taken from the implementation that drew every part anew into one buffer.
+    // Taken when corners were first rounded to 1/1024 of a pixel. From the implementation before, which drew every part anew into
+    // one buffer, 5 of 581,401 covered pixels differ in the mask and 4 by more than 1e-5 in depth: centres next to an edge.
     assert_eq!(
         (pieces, format!("{contours:016x}"), format!("{depth:016x}")),
-        (92_687, "f7234d505b76b448".into(), "a1904a0c8faa84df".into())
+        (92_688, "2729aa318c8262f6".into(), "5a31956de2d35d32".into())
     );
 }
 

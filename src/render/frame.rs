@@ -117,13 +117,12 @@ fn draw_all(
         let (nb, nc) = (nb - na, nc - na);
         let dx = (nb * (c.y - a.y) - nc * (b.y - a.y)) * inverse;
         let dy = (nc * (b.x - a.x) - nb * (c.x - a.x)) * inverse;
-        let [lo, hi] = triangle.limits;
-        triangle.runs(camera.width, camera.height, |run| {
+        triangle.runs(|run| {
             let y = run.row as f64 + 0.5;
             let row_start = na + dy * (y - a.y);
             for column in run.from..run.to {
                 let i = run.row * width + column;
-                let q = (run.nearness + run.step * (column - run.from) as f32).max(lo).min(hi);
+                let q = run.nearness(column);
                 if let (Some(at), Some(part), Some(normal)) = (nearness.get_mut(i), part.get_mut(i), normal.get_mut(i))
                     && q > *at
                 {

@@ -15,6 +15,7 @@ mod raster;
 mod shade;
 mod surface;
 mod trace;
+mod triangle;
 mod view;
 mod visibility;
 

@@ -3,6 +3,7 @@
 //! Camera coordinates: x right, y up, z towards the camera, eye at the origin. `nearness` is 1 / depth for a pinhole
 //! and -depth for a parallel projection: linear over the image inside a triangle, larger is nearer in both.
 
+use super::triangle::place;
 use super::{Camera, Projection};
 use crate::geom::{Affine, Mesh, Solid};
 use glam::{DMat3, DVec3};
@@ -21,6 +22,15 @@ pub(super) struct Point {
     pub nearness: f64,
     /// Scene units along the viewing axis; NaN when the vertex cannot be used.
     pub depth: f64,
+    /// Position for the rasteriser: see [`place`].
+    pub place: [i32; 2],
+}
+
+impl Point {
+    #[inline(always)]
+    pub fn new(x: f64, y: f64, nearness: f64, depth: f64) -> Point {
+        Point { x, y, nearness, depth, place: [place(x), place(y)] }
+    }
 }
 
 /// The image side of a camera.
@@ -50,9 +60,9 @@ impl Lens {
         if self.pinhole {
             let nearness = 1.0 / depth;
             let k = self.scale * nearness;
-            Point { x: self.cx + k * p.x, y: self.cy - k * p.y, nearness, depth }
+            Point::new(self.cx + k * p.x, self.cy - k * p.y, nearness, depth)
         } else {
-            Point { x: self.cx + self.scale * p.x, y: self.cy - self.scale * p.y, nearness: -depth, depth }
+            Point::new(self.cx + self.scale * p.x, self.cy - self.scale * p.y, -depth, depth)
         }
     }
 
@@ -159,10 +169,10 @@ pub(super) fn project_mesh(mesh: &Mesh, placement: &Placement, lens: &Lens, out:
         let p = placement.point(p.as_dvec3());
         // Written so that NaN fails it.
         if !(p.x.abs() < HUGE && p.y.abs() < HUGE && p.z.abs() < HUGE) {
-            return Point { x: 0.0, y: 0.0, nearness: 0.0, depth: f64::NAN };
+            return Point::new(0.0, 0.0, 0.0, f64::NAN);
         }
         if -p.z < Camera::NEAR {
-            return Point { x: 0.0, y: 0.0, nearness: 0.0, depth: -p.z };
+            return Point::new(0.0, 0.0, 0.0, -p.z);
         }
         range.near = range.near.min(-p.z);
         range.far = range.far.max(-p.z);

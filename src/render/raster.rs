@@ -1,104 +1,12 @@
-//! The rasteriser: triangles in image coordinates into runs of pixels.
+//! The rasteriser: the triangles of a solid, cut at the near plane, and the picture of their nearness.
 //!
-//! A pixel belongs to a triangle when its centre is inside; centres on an edge go to the triangle to the right of or
-//! below it (the top-left rule). Every edge is walked from its upper to its lower end whichever triangle asks, so
-//! triangles that share an edge neither overlap nor leave gaps, at any size. It does no shading and keeps no state.
+//! It does no shading and keeps no state. Which pixels a triangle covers is said in [`super::triangle`].
 
-use super::project::{Lens, Placement, Point, project};
-use super::{Camera, project::DepthRange};
+use super::Camera;
+use super::project::{DepthRange, Lens, Placement, Point, project};
+use super::triangle::Triangle;
 use crate::geom::{Mesh, Solid};
 use glam::DVec3;
-
-/// A run of pixels in one row; nearness changes linearly from pixel to pixel.
-pub(super) struct Run {
-    pub row: usize,
-    pub from: usize,
-    pub to: usize,
-    /// Nearness at the first pixel's centre.
-    pub nearness: f32,
-    /// Change of nearness per pixel.
-    pub step: f32,
-}
-
-/// The first pixel whose centre is not before `at`, from 0 to `side`. The same as rounding up, without a call to the
-/// library: NaN gives 0.
-#[inline]
-fn first_centre(at: f64, side: u32) -> u32 {
-    let (at, side) = (at - 0.5, f64::from(side));
-    let at = if at > 0.0 { at } else { 0.0 };
-    let at = if at < side { at } else { side };
-    let whole = at as u32;
-    whole + u32::from(f64::from(whole) < at)
-}
-
-/// One triangle, ready to be drawn.
-pub(super) struct Triangle {
-    pub points: [Point; 3],
-    /// Least and greatest nearness of the corners.
-    pub limits: [f32; 2],
-    /// Twice the area in pixels; negative when counter-clockwise as seen in the image.
-    pub area: f64,
-}
-
-impl Triangle {
-    /// `None` when no pixel centre of a `width` x `height` image can be inside.
-    #[inline]
-    pub fn new(points: [Point; 3], width: u32, height: u32) -> Option<Triangle> {
-        let [a, b, c] = points;
-        let misses = |a: f64, b: f64, c: f64, side: u32| {
-            first_centre(a.min(b).min(c), side) >= first_centre(a.max(b).max(c), side)
-        };
-        if misses(a.y, b.y, c.y, height) || misses(a.x, b.x, c.x, width) {
-            return None;
-        }
-        let area = (b.x - a.x) * (c.y - a.y) - (b.y - a.y) * (c.x - a.x);
-        let lo = a.nearness.min(b.nearness).min(c.nearness) as f32;
-        let hi = a.nearness.max(b.nearness).max(c.nearness) as f32;
-        (area != 0.0 && area.is_finite()).then_some(Triangle { points, limits: [lo, hi], area })
-    }
-
-    /// Calls `draw` for every row's run of pixels.
-    #[inline]
-    pub fn runs(&self, width: u32, height: u32, mut draw: impl FnMut(Run)) {
-        let [a, b, c] = self.points;
-        let inverse = 1.0 / self.area;
-        let (qb, qc) = (b.nearness - a.nearness, c.nearness - a.nearness);
-        let dx = (qb * (c.y - a.y) - qc * (b.y - a.y)) * inverse;
-        let dy = (qc * (b.x - a.x) - qb * (c.x - a.x)) * inverse;
-        let [mut top, mut middle, mut bottom] = [a, b, c];
-        let above = |p: &Point, q: &Point| (p.y, p.x) <= (q.y, q.x);
-        if !above(&top, &middle) {
-            std::mem::swap(&mut top, &mut middle);
-        }
-        if !above(&middle, &bottom) {
-            std::mem::swap(&mut middle, &mut bottom);
-        }
-        if !above(&top, &middle) {
-            std::mem::swap(&mut top, &mut middle);
-        }
-        let slope = |p: &Point, q: &Point| (q.x - p.x) / (q.y - p.y);
-        let long = slope(&top, &bottom);
-        let row_at = |y: f64| first_centre(y, height) as usize;
-        let column = |x: f64| first_centre(x, width) as usize;
-        for (upper, lower) in [(&top, &middle), (&middle, &bottom)] {
-            let (first, past) = (row_at(upper.y), row_at(lower.y));
-            if first >= past {
-                continue;
-            }
-            let short = slope(upper, lower);
-            for row in first..past {
-                let y = row as f64 + 0.5;
-                let x1 = column(top.x + (y - top.y) * long);
-                let x2 = column(upper.x + (y - upper.y) * short);
-                let (from, to) = if x1 <= x2 { (x1, x2) } else { (x2, x1) };
-                if from < to {
-                    let nearness = a.nearness + dx * (from as f64 + 0.5 - a.x) + dy * (y - a.y);
-                    draw(Run { row, from, to, nearness: nearness as f32, step: dx as f32 });
-                }
-            }
-        }
-    }
-}
 
 /// What a triangle is, besides its corners in the image.
 pub(super) struct Source<'a> {
@@ -223,7 +131,7 @@ pub(super) fn draw_nearness(
     buffer.clear();
     buffer.resize(camera.pixels(), empty(camera));
     let area = Area::whole(camera);
-    each_triangle(solid, camera, points, |triangle, _| fill(triangle, camera, &area, buffer));
+    each_triangle(solid, camera, points, |triangle, _| triangle.fill(buffer, [area.left, area.right], area.top));
     range
 }
 
@@ -238,28 +146,8 @@ pub(super) fn draw_mesh(
 ) {
     buffer.clear();
     buffer.resize(area.pixels(), empty(camera));
-    mesh_triangles(mesh, placement, camera, points, |triangle, _, _| fill(triangle, camera, area, buffer));
-}
-
-/// Keeps the nearer of a triangle and what is there, in a buffer of an area's rows.
-#[inline]
-fn fill(triangle: &Triangle, camera: &Camera, area: &Area, buffer: &mut [f32]) {
-    let [lo, hi] = triangle.limits;
-    let columns = area.right - area.left;
-    triangle.runs(camera.width, camera.height, |run| {
-        let (from, to) = (run.from.max(area.left), run.to.min(area.right));
-        if run.row < area.top || from >= to {
-            return;
-        }
-        let (start, skipped) = ((run.row - area.top) * columns, from - run.from);
-        let Some(pixels) = buffer.get_mut(start + from - area.left..start + to - area.left) else { return };
-        for (i, pixel) in pixels.iter_mut().enumerate() {
-            // Comparisons that NaN fails are one instruction each, which `max` and `min` are not.
-            let q = run.nearness + run.step * (i + skipped) as f32;
-            let q = if q > lo { q } else { lo };
-            let q = if q < hi { q } else { hi };
-            *pixel = if q > *pixel { q } else { *pixel };
-        }
+    mesh_triangles(mesh, placement, camera, points, |triangle, _, _| {
+        triangle.fill(buffer, [area.left, area.right], area.top);
     });
 }
 
@@ -326,6 +214,17 @@ impl Area {
     }
 }
 
+/// The first pixel whose centre is not before `at`, from 0 to `side`. The same as rounding up, without a call to the
+/// library: NaN gives 0.
+#[inline]
+fn first_centre(at: f64, side: u32) -> u32 {
+    let (at, side) = (at - 0.5, f64::from(side));
+    let at = if at > 0.0 { at } else { 0.0 };
+    let at = if at < side { at } else { side };
+    let whole = at as u32;
+    whole + u32::from(f64::from(whole) < at)
+}
+
 /// The nearness of a pixel that shows nothing.
 pub(super) fn empty(camera: &Camera) -> f32 {
     if Lens::new(camera).pinhole { 0.0 } else { f32::NEG_INFINITY }
@@ -334,55 +233,6 @@ pub(super) fn empty(camera: &Camera) -> f32 {
 #[cfg(test)]
 mod tests {
     use super::*;
-
-    fn at(x: f64, y: f64) -> Point {
-        Point { x, y, nearness: 1.0, depth: 1.0 }
-    }
-
-    fn cover(triangles: &[[Point; 3]], side: u32) -> Vec<u32> {
-        let mut count = vec![0; (side * side) as usize];
-        for t in triangles {
-            if let Some(t) = Triangle::new(*t, side, side) {
-                t.runs(side, side, |run| {
-                    for x in run.from..run.to {
-                        count[run.row * side as usize + x] += 1;
-                    }
-                });
-            }
-        }
-        count
-    }
-
-    #[test]
-    fn a_fan_of_triangles_covers_each_pixel_once() {
-        let mut state = 7u64;
-        let mut unit = || {
-            state = state.wrapping_mul(6364136223846793005).wrapping_add(1442695040888963407);
-            (state >> 11) as f64 / (1u64 << 53) as f64
-        };
-        for round in 0..200 {
-            // Corners on quarter pixels every other time: centres lie exactly on edges.
-            let mut place = |scale: f64| {
-                let v = unit() * scale;
-                if round % 2 == 0 { (v * 2.0).round() / 2.0 } else { v }
-            };
-            let middle = at(4.0 + place(8.0), 4.0 + place(8.0));
-            let far = if round % 3 == 0 { 1e6 } else { 0.0 };
-            let square = [at(-far, -far), at(16.0 + far, -far), at(16.0 + far, 16.0 + far), at(-far, 16.0 + far)];
-            let fan: Vec<_> = (0..4).map(|i| [square[i], square[(i + 1) % 4], middle]).collect();
-            assert!(cover(&fan, 16).iter().all(|&n| n == 1), "round {round}");
-        }
-    }
-
-    #[test]
-    fn only_centres_inside_count() {
-        let count = cover(&[[at(0.5, 0.5), at(3.5, 0.5), at(0.5, 3.5)]], 5);
-        let mut wanted = vec![0; 25];
-        for (x, y) in [(0, 0), (1, 0), (2, 0), (0, 1), (1, 1), (0, 2)] {
-            wanted[y * 5 + x] = 1;
-        }
-        assert_eq!(count, wanted);
-    }
 
     #[test]
     fn the_near_plane_cuts_to_a_triangle_or_a_quad() {

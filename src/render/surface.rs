@@ -18,11 +18,10 @@ impl View {
         let mut nearest = vec![empty(&camera); camera.pixels()];
         let mut faces: Vec<Option<(usize, usize)>> = vec![None; camera.pixels()];
         each_triangle(solid, &camera, &points, |triangle, source| {
-            let [lo, hi] = triangle.limits;
-            triangle.runs(camera.width, camera.height, |run| {
+            triangle.runs(|run| {
                 for column in run.from..run.to {
                     let i = run.row * camera.width as usize + column;
-                    let q = (run.nearness + run.step * (column - run.from) as f32).max(lo).min(hi);
+                    let q = run.nearness(column);
                     if let (Some(at), Some(face)) = (nearest.get_mut(i), faces.get_mut(i))
                         && q > *at
                     {

@@ -1,0 +1,181 @@
+//! How fast a new pose is drawn and scored, on the meshes and poses of a folder, beside a plain rasteriser written out below.
+//!
+//!     cargo run --release --example render_kit -- DATA_DIR [MESH…]
+//!
+//! DATA_DIR holds `vase.bin`, `body.bin`, `dense.bin` (two u32 counts, float32 vertices, u32 triangles) and `poses.bin` (row-major
+//! 4 x 4 float32). The camera is at the origin and looks along -z, 45 degrees from top to bottom. Each evaluation has another pose.
+//! Prints one JSON line for each mesh, size and task: `depth`, `contour` (contour pieces, for us; contour pixels, for the plain one)
+//! and `likelihood` (their mean distance from the contours of the last pose).
+
+mod clock;
+#[path = "render_kit/plain.rs"]
+mod plain;
+
+use clock::processor_seconds;
+use glam::{DAffine3, DMat3, DVec3, Vec3};
+use pcadlang::geom::{Affine, Mesh, Solid};
+use pcadlang::render::{Camera, Channels, Contours, Frame, Projection};
+use pcadlang::vision::chamfer::{Chamfer, ChamferOptions, Scratch};
+use pcadlang::vision::contour_map::ContourMap;
+use pcadlang::vision::elements::Elements;
+use plain::Plain;
+use std::error::Error;
+use std::path::Path;
+use std::sync::Arc;
+
+type Pose = [f32; 16];
+
+/// Vertices and triangles as they are in the file.
+pub struct Raw {
+    vertices: Vec<[f32; 3]>,
+    triangles: Vec<[u32; 3]>,
+}
+
+fn main() -> Result<(), Box<dyn Error>> {
+    let args: Vec<String> = std::env::args().skip(1).collect();
+    let [dir, meshes @ ..] = &args[..] else { return Err("usage: render_kit DATA_DIR [MESH…]".into()) };
+    let dir = Path::new(dir);
+    let poses: Vec<Pose> = words(&dir.join("poses.bin"))?
+        .chunks_exact(16)
+        .map(|c| std::array::from_fn(|i| f32::from_bits(c[i])))
+        .collect();
+    let last = *poses.last().ok_or("there are no poses")?;
+    for name in ["vase", "body", "dense"].into_iter().filter(|m| meshes.is_empty() || meshes.iter().any(|n| n == m)) {
+        let raw = load(&dir.join(name).with_extension("bin"))?;
+        let mesh = Mesh::new(
+            raw.vertices.iter().map(|v| Vec3::from_array(*v)).collect(),
+            raw.triangles.clone(),
+            vec![0; raw.triangles.len()],
+        )?;
+        let solid = Solid::new(Arc::new(mesh));
+        for size in [64, 128, 256, 512] {
+            let case = Case { mesh: name, triangles: raw.triangles.len(), size };
+            ours(&case, &solid, &raw, &poses, &last)?;
+            theirs(&case, &raw, &poses, &last);
+        }
+    }
+    Ok(())
+}
+
+fn words(path: &Path) -> Result<Vec<u32>, Box<dyn Error>> {
+    let bytes = std::fs::read(path).map_err(|e| format!("{}: {e}", path.display()))?;
+    Ok(bytes.as_chunks().0.iter().map(|c| u32::from_le_bytes(*c)).collect())
+}
+
+fn load(path: &Path) -> Result<Raw, Box<dyn Error>> {
+    let words = words(path)?;
+    let too_short = || format!("{}: too short", path.display());
+    let (n, m) = match words[..] {
+        [n, m, ..] => (n as usize, m as usize),
+        _ => return Err(too_short().into()),
+    };
+    let vertices = words.get(2..2 + 3 * n).ok_or_else(too_short)?;
+    let triangles = words.get(2 + 3 * n..2 + 3 * (n + m)).ok_or_else(too_short)?;
+    let vertices = vertices.as_chunks().0.iter().map(|v: &[u32; 3]| v.map(f32::from_bits)).collect();
+    Ok(Raw { vertices, triangles: triangles.as_chunks().0.to_vec() })
+}
+
+/// What is drawn, at how many pixels.
+struct Case {
+    mesh: &'static str,
+    triangles: usize,
+    size: u32,
+}
+
+impl Case {
+    /// Times evaluations until they are known well, and prints the line.
+    fn measure(&self, peer: &str, task: &str, extra: &str, mut evaluate: impl FnMut(usize)) {
+        let mut next = 0;
+        let mut run = |n: usize| {
+            let begun = processor_seconds();
+            (next..next + n).for_each(&mut evaluate);
+            next += n;
+            1e3 * (processor_seconds() - begun)
+        };
+        // The clock ticks in milliseconds.
+        let (mut n, mut taken) = (1, 0.0);
+        while taken < 50.0 {
+            n *= 2;
+            taken = run(n);
+        }
+        n = (n as f64 * 200.0 / taken) as usize + 1;
+        let mut times: Vec<f64> = (0..5).map(|_| run(n) / n as f64).collect();
+        times.sort_by(f64::total_cmp);
+        let Case { mesh, triangles, size } = self;
+        println!(
+            "{{\"peer\":\"{peer}\",\"mesh\":\"{mesh}\",\"tris\":{triangles},\"size\":{size},\"task\":\"{task}\",\"threads\":1,\
+             \"cpu_ms_best\":{:.5},\"cpu_ms_median\":{:.5}{extra}}}",
+            times[0], times[2]
+        );
+    }
+}
+
+fn camera(size: u32) -> Camera {
+    let half = 0.5 * f64::from(size);
+    let projection = Projection::Pinhole { focal_px: half / 22.5f64.to_radians().tan(), cx: half, cy: half };
+    let (right, up, forward) = (DVec3::X, DVec3::Y, DVec3::NEG_Z);
+    Camera { eye: DVec3::ZERO, right, up, forward, width: size, height: size, projection }
+}
+
+fn placed(solid: &Solid, pose: &Pose) -> Solid {
+    let p = pose.map(f64::from);
+    let column = |i: usize| DVec3::new(p[i], p[4 + i], p[8 + i]);
+    let matrix3 = DMat3::from_cols(column(0), column(1), column(2));
+    solid.placed(Affine(DAffine3 { matrix3, translation: column(3) }))
+}
+
+fn elements(c: &Contours) -> Elements<'_> {
+    Elements { x: &c.x, y: &c.y, tx: &c.tx, ty: &c.ty, length: &c.length, width: c.width, height: c.height }
+}
+
+fn ours(case: &Case, solid: &Solid, raw: &Raw, poses: &[Pose], last: &Pose) -> Result<(), Box<dyn Error>> {
+    let camera = camera(case.size);
+    let at = |i: usize| placed(solid, &poses[i % poses.len()]);
+    let depth = |i: usize| Frame::render(&at(i), &camera, Channels::Depth);
+    let mut reference = Plain::new(raw, case.size as usize);
+    let agreement = agreement(&depth(0).depth, reference.depth(&poses[0]));
+    case.measure("pcadlang", "depth", &agreement, |i| drop(std::hint::black_box(depth(i))));
+    case.measure("pcadlang", "contour", "", |i| drop(std::hint::black_box(Contours::of(&at(i), &camera))));
+    let seen = Contours::of(&placed(solid, last), &camera);
+    let observed = ContourMap {
+        x: seen.x.clone(),
+        y: seen.y.clone(),
+        tx: seen.tx.clone(),
+        ty: seen.ty.clone(),
+        strength: vec![1.0; seen.len()],
+        ..ContourMap::new(case.size, case.size)
+    };
+    let chamfer = Chamfer::prepare(&observed, case.size, case.size, &ChamferOptions::default())?;
+    let mut scratch = Scratch::default();
+    case.measure("pcadlang", "likelihood", "", |i| {
+        let contours = Contours::of(&at(i), &camera);
+        std::hint::black_box(chamfer.log_likelihood_with(&elements(&contours), &mut scratch));
+    });
+    Ok(())
+}
+
+fn theirs(case: &Case, raw: &Raw, poses: &[Pose], last: &Pose) {
+    let mut plain = Plain::new(raw, case.size as usize);
+    plain.observe(last);
+    case.measure("plain", "depth", "", |i| {
+        std::hint::black_box(plain.depth(&poses[i % poses.len()]));
+    });
+    case.measure("plain", "contour", "", |i| {
+        std::hint::black_box(plain.contour(&poses[i % poses.len()]));
+    });
+    case.measure("plain", "likelihood", "", |i| {
+        std::hint::black_box(plain.likelihood(&poses[i % poses.len()]));
+    });
+}
+
+/// How far a depth picture is from the reference: pixels of the mask, and the median of relative differences.
+fn agreement(depth: &[f32], reference: &[f32]) -> String {
+    let pairs = || depth.iter().zip(reference);
+    let mask = pairs().filter(|(a, b)| a.is_finite() != b.is_finite()).count();
+    let both = pairs().filter(|(a, b)| a.is_finite() && b.is_finite());
+    let mut errors: Vec<f32> = both.map(|(a, b)| (a - b).abs() / b).collect();
+    errors.sort_by(f32::total_cmp);
+    let median = errors.get(errors.len() / 2).copied().unwrap_or(0.0);
+    let largest = errors.last().copied().unwrap_or(0.0);
+    format!(",\"mask_diff_px\":{mask},\"depth_err_median\":{median:e},\"depth_err_most\":{largest:e}")
+}
