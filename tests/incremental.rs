@@ -94,6 +94,20 @@ fn shipped_animal() {
     same_of_picture("autorig.pcad", Some(48), &[SKIER], 20, 20);
 }
 
+/// A branch with choices of its own that one computation lets go of and the parameters of a choice take up.
+#[test]
+fn branches_that_change_hands() {
+    for kernel in ["gibbs(one($finite))", "mh(one(@**))"] {
+        let text = format!(
+            "assume f ~ flip(0.4); let x = if f {{ a ~ normal(0.8, 1); a }} else {{ 0.8 }};
+             assume h ~ flip(0.3); let y = if h {{ [x, x][1] }} else {{ 0.5 }};
+             assume z ~ normal(if 1 > y {{ x }} else {{ 0 }}, 1); observe normal(y + z, 1) = 1;
+             infer {{ repeat 2000 {{ {kernel}; collect f, x, h, z; }} }}"
+        );
+        same(kernel, || Program::parse(&text).unwrap_or_else(|e| panic!("{e}")), 2000, 20);
+    }
+}
+
 /// A program of a few choices that read each other through arithmetic, branches, loops and arrays.
 fn program() -> impl Strategy<Value = String> {
     let number = |n: usize| {

@@ -10,6 +10,7 @@ use super::node::*;
 use crate::lang::code::{Code, Op};
 use crate::lang::error::{FaultKind, RunError};
 use crate::lang::value::Value;
+use rustc_hash::FxHashMap;
 use smallvec::SmallVec;
 
 /// What became of one attempt to evaluate a node.
@@ -24,17 +25,61 @@ pub(crate) enum Step {
 pub(crate) type Failure = Box<RunError>;
 
 impl Graph {
-    /// Finishes an update: runs new and stale effects, drops what nothing holds, re-scores absorbing choices.
+    /// Finishes an update: runs new and stale effects, re-scores absorbing choices, drops what nothing holds.
     pub fn settle(&mut self, code: &Code) -> Result<(), Failure> {
         loop {
             self.run_effects(code)?;
-            self.sweep(code);
-            let Some(n) = self.stale_choices.pop() else { break };
-            if self.nodes[n as usize].state == State::Stale {
-                self.run_in_place(code, n)?;
+            // What one node lets go of a choice may take up, so choices come first, but for those that go as well.
+            if self.unheld.is_empty() && self.idle.is_empty() {
+                let Some(n) = self.stale_choices.pop() else { break };
+                if self.nodes[n as usize].state == State::Stale {
+                    self.run_in_place(code, n)?;
+                }
+                continue;
+            }
+            let doomed = if self.stale_choices.is_empty() { Vec::new() } else { self.doomed(code) };
+            let stays = |n: &NodeId| self.nodes[*n as usize].state == State::Stale && doomed.binary_search(n).is_err();
+            let next = self.stale_choices.iter().rposition(stays).filter(|_| self.idle.is_empty());
+            match next {
+                Some(i) => {
+                    let n = self.stale_choices.swap_remove(i);
+                    self.run_in_place(code, n)?;
+                }
+                None => self.sweep(code),
             }
         }
+        self.sweep(code);
         self.settle_choices(code)
+    }
+
+    /// What would be emptied if nothing took up again what was let go, in order.
+    fn doomed(&self, code: &Code) -> Vec<NodeId> {
+        let mut open = self.unheld.clone();
+        open.retain(|n| self.nodes[*n as usize].refs == 0);
+        let (mut doomed, mut left) = (Vec::new(), FxHashMap::<NodeId, u32>::default());
+        while let Some(n) = open.pop() {
+            let node = &self.nodes[n as usize];
+            if node.state == State::Empty {
+                continue;
+            }
+            doomed.push(n);
+            let mut release = |d: NodeId| {
+                let refs = left.entry(d).or_insert(self.nodes[d as usize].refs);
+                *refs = refs.saturating_sub(1);
+                if *refs == 0 {
+                    open.push(d);
+                }
+            };
+            if node.flags & HELD != 0 {
+                self.each_dep(code, n, |d, _| release(d));
+            }
+            if let Some(Side::Child(c)) = node.side.as_deref() {
+                let frame = &self.frames[c.frame as usize];
+                code.blocks[frame.block as usize].effects.iter().for_each(|s| release(frame.base + s));
+            }
+        }
+        doomed.sort_unstable();
+        doomed
     }
 
     fn run_effects(&mut self, code: &Code) -> Result<(), Failure> {
