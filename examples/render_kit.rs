@@ -1,6 +1,6 @@
 //! How fast a new pose is drawn and scored, on the meshes and poses of a folder, beside a plain rasteriser written out below.
 //!
-//!     cargo run --release --example render_kit -- DATA_DIR [MESH…]
+//!     cargo run --release --example render_kit -- DATA_DIR [MESHES [SIZES [TASKS [PEERS]]]]     (lists with commas; all if left out)
 //!
 //! DATA_DIR holds `vase.bin`, `body.bin`, `dense.bin` (two u32 counts, float32 vertices, u32 triangles) and `poses.bin` (row-major
 //! 4 x 4 float32). The camera is at the origin and looks along -z, 45 degrees from top to bottom. Each evaluation has another pose.
@@ -33,14 +33,17 @@ pub struct Raw {
 
 fn main() -> Result<(), Box<dyn Error>> {
     let args: Vec<String> = std::env::args().skip(1).collect();
-    let [dir, meshes @ ..] = &args[..] else { return Err("usage: render_kit DATA_DIR [MESH…]".into()) };
+    let [dir, choices @ ..] = &args[..] else {
+        return Err("usage: render_kit DATA_DIR [MESHES [SIZES [TASKS [PEERS]]]]".into());
+    };
+    let chosen = |i: usize, name: &str| choices.get(i).is_none_or(|list: &String| list.split(',').any(|n| n == name));
     let dir = Path::new(dir);
     let poses: Vec<Pose> = words(&dir.join("poses.bin"))?
         .chunks_exact(16)
         .map(|c| std::array::from_fn(|i| f32::from_bits(c[i])))
         .collect();
     let last = *poses.last().ok_or("there are no poses")?;
-    for name in ["vase", "body", "dense"].into_iter().filter(|m| meshes.is_empty() || meshes.iter().any(|n| n == m)) {
+    for name in ["vase", "body", "dense"].into_iter().filter(|m| chosen(0, m)) {
         let raw = load(&dir.join(name).with_extension("bin"))?;
         let mesh = Mesh::new(
             raw.vertices.iter().map(|v| Vec3::from_array(*v)).collect(),
@@ -48,8 +51,13 @@ fn main() -> Result<(), Box<dyn Error>> {
             vec![0; raw.triangles.len()],
         )?;
         let solid = Solid::new(Arc::new(mesh));
-        for size in [64, 128, 256, 512] {
-            let case = Case { mesh: name, triangles: raw.triangles.len(), size };
+        for size in [64, 128, 256, 512].into_iter().filter(|size| chosen(1, &size.to_string())) {
+            let case = Case {
+                mesh: name,
+                triangles: raw.triangles.len(),
+                size,
+                chosen: &|peer, task| chosen(2, task) && chosen(3, peer),
+            };
             ours(&case, &solid, &raw, &poses, &last)?;
             theirs(&case, &raw, &poses, &last);
         }
@@ -76,15 +84,20 @@ fn load(path: &Path) -> Result<Raw, Box<dyn Error>> {
 }
 
 /// What is drawn, at how many pixels.
-struct Case {
+struct Case<'a> {
     mesh: &'static str,
     triangles: usize,
     size: u32,
+    /// Whether a peer's task was asked for.
+    chosen: &'a dyn Fn(&str, &str) -> bool,
 }
 
-impl Case {
+impl Case<'_> {
     /// Times evaluations until they are known well, and prints the line.
     fn measure(&self, peer: &str, task: &str, extra: &str, mut evaluate: impl FnMut(usize)) {
+        if !(self.chosen)(peer, task) {
+            return;
+        }
         let mut next = 0;
         let mut run = |n: usize| {
             let begun = processor_seconds();
@@ -101,7 +114,7 @@ impl Case {
         n = (n as f64 * 200.0 / taken) as usize + 1;
         let mut times: Vec<f64> = (0..5).map(|_| run(n) / n as f64).collect();
         times.sort_by(f64::total_cmp);
-        let Case { mesh, triangles, size } = self;
+        let Case { mesh, triangles, size, .. } = self;
         println!(
             "{{\"peer\":\"{peer}\",\"mesh\":\"{mesh}\",\"tris\":{triangles},\"size\":{size},\"task\":\"{task}\",\"threads\":1,\
              \"cpu_ms_best\":{:.5},\"cpu_ms_median\":{:.5}{extra}}}",
@@ -128,7 +141,7 @@ fn elements(c: &Contours) -> Elements<'_> {
     Elements { x: &c.x, y: &c.y, tx: &c.tx, ty: &c.ty, length: &c.length, width: c.width, height: c.height }
 }
 
-fn ours(case: &Case, solid: &Solid, raw: &Raw, poses: &[Pose], last: &Pose) -> Result<(), Box<dyn Error>> {
+fn ours(case: &Case<'_>, solid: &Solid, raw: &Raw, poses: &[Pose], last: &Pose) -> Result<(), Box<dyn Error>> {
     let camera = camera(case.size);
     let at = |i: usize| placed(solid, &poses[i % poses.len()]);
     let depth = |i: usize| Frame::render(&at(i), &camera, Channels::Depth);
@@ -154,7 +167,7 @@ fn ours(case: &Case, solid: &Solid, raw: &Raw, poses: &[Pose], last: &Pose) -> R
     Ok(())
 }
 
-fn theirs(case: &Case, raw: &Raw, poses: &[Pose], last: &Pose) {
+fn theirs(case: &Case<'_>, raw: &Raw, poses: &[Pose], last: &Pose) {
     let mut plain = Plain::new(raw, case.size as usize);
     plain.observe(last);
     case.measure("plain", "depth", "", |i| {

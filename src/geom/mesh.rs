@@ -6,6 +6,7 @@
 use super::edges;
 use super::{Bounds, GeomError};
 use glam::Vec3;
+use rustc_hash::FxHashMap;
 use std::sync::Arc;
 
 /// In [`Edge::faces`]: there is no second face.
@@ -22,6 +23,85 @@ pub struct Edge {
     pub crease: bool,
 }
 
+impl Edge {
+    /// Whether there is a face on one side only.
+    pub fn is_boundary(&self) -> bool {
+        self.faces[1] == NO_FACE
+    }
+
+    /// Whether it shows as a line however the mesh is turned: a crease or a boundary.
+    pub fn is_sharp(&self) -> bool {
+        self.crease || self.is_boundary()
+    }
+}
+
+/// The edges of a mesh, each once: a slice of them, those first that show as lines however the mesh is turned.
+#[derive(Clone, Debug, Default, PartialEq)]
+pub struct Edges {
+    list: Vec<Edge>,
+    /// Where each run of connected creases or boundaries ends.
+    runs: Vec<usize>,
+    open: bool,
+}
+
+impl Edges {
+    /// Puts edges in order: boundaries and creases that hang together, one such line after another, then the others.
+    pub fn new(list: Vec<Edge>) -> Edges {
+        let (sharp, smooth): (Vec<Edge>, Vec<Edge>) = list.into_iter().partition(Edge::is_sharp);
+        // A line for each edge by itself, boundaries and creases apart; where two meet, the shorter joins the longer.
+        let mut lines: Vec<Vec<Edge>> = Vec::new();
+        let mut line_at: FxHashMap<(u32, bool), usize> = FxHashMap::default();
+        for edge in sharp {
+            let mut line = lines.len();
+            lines.push(vec![edge]);
+            let met = edge.vertices.map(|v| line_at.insert((v, edge.is_boundary()), line));
+            for other in met.into_iter().flatten() {
+                if other == line {
+                    continue;
+                }
+                let (long, short) = if lines[other].len() < lines[line].len() { (line, other) } else { (other, line) };
+                let moved = std::mem::take(&mut lines[short]);
+                line_at.extend(moved.iter().flat_map(|e| e.vertices.map(|v| ((v, e.is_boundary()), long))));
+                lines[long].extend(moved);
+                line = long;
+            }
+        }
+        let open = lines.iter().flatten().any(Edge::is_boundary);
+        let (mut list, mut runs) = (Vec::new(), Vec::new());
+        for line in lines.into_iter().filter(|line| !line.is_empty()) {
+            list.extend(line);
+            runs.push(list.len());
+        }
+        list.extend(smooth);
+        Edges { list, runs, open }
+    }
+
+    /// The creases and boundaries, those that hang together at a time.
+    pub fn lines(&self) -> impl Iterator<Item = &[Edge]> {
+        let firsts = std::iter::once(0).chain(self.runs.iter().copied());
+        firsts.zip(&self.runs).map(|(first, past)| &self.list[first..*past])
+    }
+
+    /// Whether there is a boundary.
+    pub fn open(&self) -> bool {
+        self.open
+    }
+}
+
+impl std::ops::Deref for Edges {
+    type Target = [Edge];
+
+    fn deref(&self) -> &[Edge] {
+        &self.list
+    }
+}
+
+impl FromIterator<Edge> for Edges {
+    fn from_iter<I: IntoIterator<Item = Edge>>(edges: I) -> Edges {
+        Edges::new(edges.into_iter().collect())
+    }
+}
+
 /// What stays the same when a mesh's vertices move.
 #[derive(Clone, Debug, Default, PartialEq)]
 pub struct Topology {
@@ -33,8 +113,8 @@ pub struct Topology {
     pub part_count: u16,
     /// The names of parts by number, where they have some: empty strings and those beyond the end have none.
     pub part_names: Vec<Arc<str>>,
-    /// Every edge once.
-    pub edges: Vec<Edge>,
+    /// Its edges.
+    pub edges: Edges,
     /// Whether the faces are known to enclose a body without crossing each other: seen from outside, those that are turned
     /// away are hidden by others and need not be drawn. Meshes from files make no such promise.
     pub encloses: bool,
@@ -122,5 +202,30 @@ mod tests {
         assert_eq!(m.topology.edges.len(), 3);
         assert!(m.topology.edges.iter().all(|e| e.faces[1] == NO_FACE));
         assert!(m.normals.iter().all(|n| (*n - Vec3::Z).length() < 1e-6));
+    }
+    #[test]
+    fn lines_of_edges_hang_together() {
+        // Two loops of four boundary edges, told in an order that joins them late, a crease apart, and one smooth edge.
+        let edge = |a: u32, b: u32, crease: bool, other: u32| Edge { vertices: [a, b], faces: [0, other], crease };
+        let open = |a, b| edge(a, b, false, NO_FACE);
+        let list = [
+            open(0, 1),
+            open(10, 11),
+            edge(1, 2, false, 5),
+            open(2, 3),
+            open(12, 13),
+            edge(0, 20, true, 5),
+            open(1, 2),
+            open(11, 12),
+            open(3, 0),
+            open(13, 10),
+        ];
+        let edges: Edges = list.into_iter().collect();
+        let mut lines: Vec<(usize, u32)> =
+            edges.lines().map(|l| (l.len(), l.iter().flat_map(|e| e.vertices).max().unwrap_or(0))).collect();
+        lines.sort_unstable();
+        assert_eq!(lines, [(1, 20), (4, 3), (4, 13)]);
+        assert_eq!((edges.len(), edges.open(), edges[9]), (10, true, list[2]));
+        assert!(!Edges::default().open() && Edges::default().lines().next().is_none());
     }
 }

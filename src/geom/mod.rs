@@ -28,7 +28,7 @@ pub use error::GeomError;
 pub use frame::{FileFrame, UpAxis};
 pub use landmark::Landmark;
 pub use lathe::{Caps, LatheGradient, Profile, lathe, pull_lathe};
-pub use mesh::{Edge, Mesh, NO_FACE, Topology};
+pub use mesh::{Edge, Edges, Mesh, NO_FACE, Topology};
 pub use solid::{Instance, PlacedGradient, Solid};
 pub use sphere::{pull_sphere, sphere};
 

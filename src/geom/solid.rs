@@ -6,7 +6,7 @@
 
 use super::landmark::{Landmark, unique};
 use super::mesh::{MOST_PARTS, MOST_TRIANGLES};
-use super::{Affine, Bounds, Edge, GeomError, Mesh, NO_FACE, Topology, outer};
+use super::{Affine, Bounds, Edge, Edges, GeomError, Mesh, NO_FACE, Topology, outer};
 use glam::{DMat3, DVec3};
 use std::fmt;
 use std::sync::{Arc, LazyLock};
@@ -211,6 +211,7 @@ impl Solid {
             )));
         }
         let (mut positions, mut normals, mut t) = (Vec::new(), Vec::new(), Topology::default());
+        let mut edges = Vec::new();
         for i in self.instances.iter() {
             let (first, first_face) = (positions.len() as u32, t.triangles.len() as u32);
             let turn = i.affine.normal_matrix();
@@ -225,12 +226,13 @@ impl Solid {
             }));
             let last_part = (MOST_PARTS - 1) as u16;
             t.parts.extend(i.mesh.topology.parts.iter().map(|p| p.saturating_add(i.first_part).min(last_part)));
-            t.edges.extend(i.mesh.topology.edges.iter().map(|e| {
+            edges.extend(i.mesh.topology.edges.iter().map(|e| {
                 let [a, b] = e.vertices.map(|v| v + first);
                 let faces = e.faces.map(|f| if f == NO_FACE { NO_FACE } else { f + first_face });
                 Edge { vertices: if mirrored { [b, a] } else { [a, b] }, faces, crease: e.crease }
             }));
         }
+        t.edges = Edges::new(edges);
         t.part_count = self.part_count();
         for i in self.instances.iter() {
             let first = usize::from(i.first_part);
@@ -339,7 +341,7 @@ mod tests {
             let p = face.map(|v| m.positions[v as usize]);
             assert!((p[1] - p[0]).cross(p[2] - p[0]).dot(p[0] + p[1] + p[2]) > 0.0, "outward");
         }
-        for e in &t.edges {
+        for e in t.edges.iter() {
             let face = t.triangles[e.faces[0] as usize];
             assert!((0..3).any(|c| e.vertices == [face[c], face[(c + 1) % 3]]), "as the first face runs");
         }

@@ -4,11 +4,11 @@
 //! moves smoothly with the pose and does not follow the mesh's edges. Texture and shading edges are not contours here.
 //! Invariant: the five lists have one entry per piece, all finite, positions inside the image, tangents of unit length.
 
-use super::project::{Placement, Point, project};
-use super::raster::draw_nearness;
+use super::looked::Looked;
+use super::project::{DepthRange, Fronts, Placement, Projected, project};
 use super::trace::trace_mesh;
 use super::visibility::{Depths, Piece};
-use super::{Camera, frame::to_depth, layers};
+use super::{Camera, layers};
 use crate::geom::Solid;
 use std::cell::RefCell;
 
@@ -35,10 +35,13 @@ pub struct Contours {
 /// Buffers reused from call to call.
 #[derive(Default)]
 struct Scratch {
-    points: Vec<Point>,
-    depth: Vec<f32>,
-    facing: Vec<f64>,
-    /// Number of pieces found the last time.
+    projected: Projected,
+    fronts: Fronts,
+    looked: Looked,
+    /// Pieces, hidden or not.
+    pieces: Vec<Piece>,
+    hidden: Vec<bool>,
+    /// Number of pieces seen the last time.
     found: usize,
 }
 
@@ -56,19 +59,39 @@ impl Contours {
     /// As [`Contours::of`], everything drawn anew.
     pub(super) fn drawn(solid: &Solid, camera: &Camera) -> Contours {
         with_scratch(|scratch| {
-            let range = draw_nearness(solid, camera, &mut scratch.points, &mut scratch.depth);
-            to_depth(camera, &mut scratch.depth);
-            let depths = Depths::new(&scratch.depth, camera.width, camera.height, range.extent());
-            trace(solid, camera, &scratch.points, depths, &mut scratch.facing, &mut scratch.found)
+            let range = scratch.trace(solid, camera);
+            let Scratch { projected, looked, pieces, hidden, found, .. } = scratch;
+            looked.begin(solid, camera, projected);
+            hidden.clear();
+            hidden.resize(pieces.len(), true);
+            // Most pieces are seen by their first look: only the others take a second one.
+            for side in 0..2 {
+                let pixels =
+                    || hidden.iter().zip(&*pieces).filter(|(hidden, _)| **hidden).filter_map(|(_, p)| p.pixel(side));
+                if pixels().next().is_none() {
+                    break;
+                }
+                if side > 0 {
+                    looked.clear(camera);
+                }
+                pixels().for_each(|pixel| looked.mark(pixel));
+                let depth = looked.draw(solid, camera, projected);
+                let Some(depths) = Depths::new(depth, camera.width, camera.height, range.extent()) else { break };
+                for (hidden, piece) in hidden.iter_mut().zip(&*pieces) {
+                    *hidden = *hidden && !depths.visible_by(piece, side);
+                }
+            }
+            seen(pieces.iter().zip(hidden).filter(|(_, hidden)| !**hidden).map(|(piece, _)| piece), camera, found)
         })
     }
 
     /// As [`Contours::of`], with the depth image of the same solid and camera drawn before.
     pub(super) fn with_depth(solid: &Solid, camera: &Camera, depth: &[f32]) -> Contours {
         with_scratch(|scratch| {
-            let range = project(solid, camera, &mut scratch.points);
+            let range = scratch.trace(solid, camera);
             let depths = Depths::new(depth, camera.width, camera.height, range.extent());
-            trace(solid, camera, &scratch.points, depths, &mut scratch.facing, &mut scratch.found)
+            let visible = |piece: &&Piece| depths.as_ref().is_some_and(|depths| depths.visible(piece));
+            seen(scratch.pieces.iter().filter(visible), camera, &mut scratch.found)
         })
     }
 
@@ -112,28 +135,24 @@ fn with_scratch<T>(work: impl FnOnce(&mut Scratch) -> T) -> T {
     })
 }
 
-fn trace(
-    solid: &Solid,
-    camera: &Camera,
-    points: &[Point],
-    depths: Option<Depths<'_>>,
-    facing: &mut Vec<f64>,
-    found: &mut usize,
-) -> Contours {
-    let mut out = Contours::with_room(camera, *found);
-    let Some(depths) = depths else { return out };
-    let mut base = 0;
-    for instance in solid.instances() {
-        let count = instance.mesh.positions.len();
-        let Some(points) = points.get(base..base + count) else { break };
-        base += count;
-        let placement = Placement::new(camera, &instance.affine);
-        trace_mesh(&instance.mesh, &placement, camera, points, facing, |piece, _| {
-            if depths.visible(&piece) {
-                out.push(&piece);
-            }
-        });
+impl Scratch {
+    /// Projects a solid and finds its pieces of contour, hidden or not.
+    fn trace(&mut self, solid: &Solid, camera: &Camera) -> DepthRange {
+        let range = project(solid, camera, &mut self.projected);
+        self.pieces.clear();
+        for (i, instance) in solid.instances().iter().enumerate() {
+            let (placement, vertices) = (Placement::new(camera, &instance.affine), self.projected.mesh(i));
+            let pieces = &mut self.pieces;
+            trace_mesh(&instance.mesh, &placement, camera, &vertices, &mut self.fronts, |piece, _| pieces.push(piece));
+        }
+        range
     }
+}
+
+/// The contours of the pieces that are seen, where there were so many before.
+fn seen<'a>(pieces: impl Iterator<Item = &'a Piece>, camera: &Camera, found: &mut usize) -> Contours {
+    let mut out = Contours::with_room(camera, *found);
+    pieces.for_each(|piece| out.push(piece));
     *found = out.len();
     out
 }

@@ -4,8 +4,8 @@
 //! finite exactly where something is seen; the other channels have as many entries or, when not asked for, none.
 
 use super::Camera;
-use super::project::{Lens, Point, project};
-use super::raster::{draw_nearness, each_triangle, empty};
+use super::project::{Lens, Projected, project};
+use super::raster::{Candidates, draw_nearness, each_triangle, empty};
 use crate::geom::Solid;
 use glam::{DVec3, Vec3};
 use std::cell::RefCell;
@@ -36,16 +36,16 @@ pub struct Frame {
 }
 
 thread_local! {
-    /// Projected vertices, reused from frame to frame.
-    static POINTS: RefCell<Vec<Point>> = const { RefCell::new(Vec::new()) };
+    /// Projected vertices and what may be drawn, reused from frame to frame.
+    static SCRATCH: RefCell<(Projected, Candidates)> = RefCell::default();
 }
 
 impl Frame {
     /// Draws a solid. Back faces are drawn too, but for bodies that hide their own; triangles with a vertex that is not finite are left out.
     pub fn render(solid: &Solid, camera: &Camera, channels: Channels) -> Frame {
-        POINTS.with(|points| match points.try_borrow_mut() {
-            Ok(mut points) => Frame::draw(solid, camera, channels, &mut points),
-            Err(_) => Frame::draw(solid, camera, channels, &mut Vec::new()),
+        SCRATCH.with(|scratch| match scratch.try_borrow_mut() {
+            Ok(mut scratch) => Frame::draw(solid, camera, channels, &mut scratch),
+            Err(_) => Frame::draw(solid, camera, channels, &mut Default::default()),
         })
     }
 
@@ -54,19 +54,24 @@ impl Frame {
         self.depth.iter().map(|d| d.is_finite())
     }
 
-    fn draw(solid: &Solid, camera: &Camera, channels: Channels, points: &mut Vec<Point>) -> Frame {
+    fn draw(
+        solid: &Solid,
+        camera: &Camera,
+        channels: Channels,
+        (projected, candidates): &mut (Projected, Candidates),
+    ) -> Frame {
         let (width, height) = (camera.width, camera.height);
         let (mut depth, mut part, mut normal) = (Vec::new(), Vec::new(), Vec::new());
         match channels {
             Channels::Depth => {
-                draw_nearness(solid, camera, points, &mut depth);
+                draw_nearness(solid, camera, projected, candidates, &mut depth);
             }
             Channels::All => {
-                project(solid, camera, points);
+                project(solid, camera, projected);
                 depth.resize(camera.pixels(), empty(camera));
                 part.resize(camera.pixels(), u16::MAX);
                 normal.resize(camera.pixels(), [0.0; 3]);
-                draw_all(solid, camera, points, &mut depth, &mut part, &mut normal);
+                draw_all(solid, camera, projected, &mut depth, &mut part, &mut normal);
             }
         }
         to_depth(camera, &mut depth);
@@ -86,7 +91,7 @@ pub(super) fn to_depth(camera: &Camera, buffer: &mut [f32]) {
 fn draw_all(
     solid: &Solid,
     camera: &Camera,
-    points: &[Point],
+    projected: &Projected,
     nearness: &mut [f32],
     part: &mut [u16],
     normal: &mut [[f32; 3]],
@@ -94,7 +99,7 @@ fn draw_all(
     let width = camera.width as usize;
     let lens = Lens::new(camera);
     let (bend, cx, cy) = (if lens.pinhole { 1.0 / lens.scale } else { 0.0 }, lens.cx, lens.cy);
-    each_triangle(solid, camera, points, |triangle, source| {
+    each_triangle(solid, camera, projected, |triangle, source| {
         let Some(instance) = solid.instances().get(source.instance) else { return };
         let mesh = &instance.mesh;
         let number = mesh.topology.parts.get(source.face).map_or(0, |p| p.saturating_add(instance.first_part));
@@ -107,7 +112,7 @@ fn draw_all(
         };
         let corners = mesh.topology.triangles[source.face].map(corner);
         let [a, b, c] = triangle.points;
-        let weight = |p: &Point| if lens.pinhole { p.nearness } else { 1.0 };
+        let weight = |p: &super::project::Point| if lens.pinhole { p.nearness } else { 1.0 };
         let at = |i: usize| {
             let w = source.weights[i];
             (corners[0] * w[0] + corners[1] * w[1] + corners[2] * w[2]) * weight(&triangle.points[i])

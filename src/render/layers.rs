@@ -7,8 +7,8 @@
 
 use super::contours::Contours;
 use super::frame::to_depth;
-use super::project::{DepthRange, Lens, Placement, Point, project_mesh};
-use super::raster::{Area, draw_mesh};
+use super::project::{DepthRange, Fronts, Lens, Placement, Projected};
+use super::raster::{Area, Candidates, draw_mesh};
 use super::trace::trace_mesh;
 use super::visibility::{Depths, Piece};
 use super::{Camera, Projection};
@@ -65,8 +65,9 @@ struct Layers {
     size: [u32; 2],
     /// Outside this the picture shows nothing.
     drawn: Area,
-    points: Vec<Point>,
-    facing: Vec<f64>,
+    projected: Projected,
+    candidates: Candidates,
+    fronts: Fronts,
     /// Number of pieces seen the last time.
     found: usize,
 }
@@ -159,7 +160,7 @@ impl Layers {
         let slot = &mut self.slots[at];
         self.bytes -= slot.layer.bytes();
         (slot.mesh, slot.affine, slot.camera) = (Arc::downgrade(&instance.mesh), affine, eye);
-        slot.layer.draw(instance, camera, &mut self.points, &mut self.facing);
+        slot.layer.draw(instance, camera, (&mut self.projected, &mut self.candidates), &mut self.fronts);
         self.bytes += slot.layer.bytes();
         at
     }
@@ -176,15 +177,22 @@ impl Layers {
 
 impl Layer {
     /// Draws a mesh alone.
-    fn draw(&mut self, instance: &Instance, camera: &Camera, points: &mut Vec<Point>, facing: &mut Vec<f64>) {
+    fn draw(
+        &mut self,
+        instance: &Instance,
+        camera: &Camera,
+        (projected, candidates): (&mut Projected, &mut Candidates),
+        fronts: &mut Fronts,
+    ) {
         let placement = Placement::new(camera, &instance.affine);
-        points.clear();
-        self.range = project_mesh(&instance.mesh, &placement, &Lens::new(camera), points);
-        self.area = Area::around(points, camera);
-        draw_mesh(&instance.mesh, &placement, camera, points, &self.area, &mut self.depth);
+        projected.clear();
+        self.range = projected.add(&instance.mesh, &placement, &Lens::new(camera));
+        let vertices = projected.mesh(0);
+        self.area = Area::around(&vertices, camera);
+        draw_mesh(&instance.mesh, &placement, camera, &vertices, candidates, &self.area, &mut self.depth);
         to_depth(camera, &mut self.depth);
         self.pieces.clear();
-        trace_mesh(&instance.mesh, &placement, camera, points, facing, |piece, _| self.pieces.push(piece));
+        trace_mesh(&instance.mesh, &placement, camera, &vertices, fronts, |piece, _| self.pieces.push(piece));
     }
 
     /// Puts what is nearer than the picture into it.

@@ -8,17 +8,22 @@ mod camera_json;
 mod contours;
 mod frame;
 mod layers;
+mod looked;
+mod marks;
 mod outline;
 mod project;
 mod pull;
 mod raster;
 mod shade;
+mod simd;
 mod surface;
 mod trace;
 mod triangle;
 mod view;
 mod visibility;
 
+#[cfg(test)]
+mod extremes_tests;
 #[cfg(test)]
 mod testing;
 

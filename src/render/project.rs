@@ -3,15 +3,21 @@
 //! Camera coordinates: x right, y up, z towards the camera, eye at the origin. `nearness` is 1 / depth for a pinhole
 //! and -depth for a parallel projection: linear over the image inside a triangle, larger is nearer in both.
 
-use super::triangle::place;
+use super::simd::vectorised;
+use super::triangle::{Extent, Place, Triangle, place, rounded};
 use super::{Camera, Projection};
-use crate::geom::{Affine, Mesh, Solid};
-use glam::{DMat3, DVec3};
+use crate::geom::{Affine, Mesh, Solid, Topology};
+use glam::{DMat3, DVec3, Vec3};
+use std::borrow::Cow;
+
+/// Vertices worked on at a time: loops over them are long enough to be told from code that is written out, and short enough for
+/// the nearest cache.
+const LANES: usize = 64;
 
 /// Coordinates beyond this (scene units) mark a vertex as unusable.
 const HUGE: f64 = 1e9;
 
-/// A vertex in the image.
+/// A place in the image.
 #[derive(Clone, Copy, Debug)]
 pub(super) struct Point {
     /// Pixels from the left edge.
@@ -20,16 +26,14 @@ pub(super) struct Point {
     pub y: f64,
     /// See the module's head.
     pub nearness: f64,
-    /// Scene units along the viewing axis; NaN when the vertex cannot be used.
-    pub depth: f64,
-    /// Position for the rasteriser: see [`place`].
-    pub place: [i32; 2],
 }
 
 impl Point {
-    #[inline(always)]
-    pub fn new(x: f64, y: f64, nearness: f64, depth: f64) -> Point {
-        Point { x, y, nearness, depth, place: [place(x), place(y)] }
+    /// In single precision, as vertices are kept.
+    #[inline]
+    pub fn single(self) -> Point {
+        let [x, y, nearness] = [self.x, self.y, self.nearness].map(|v| f64::from(v as f32));
+        Point { x, y, nearness }
     }
 }
 
@@ -54,16 +58,12 @@ impl Lens {
     }
 
     /// The image of a point in camera coordinates, in front of the near plane.
-    #[inline]
+    #[inline(always)]
     pub fn point(&self, p: DVec3) -> Point {
         let depth = -p.z;
-        if self.pinhole {
-            let nearness = 1.0 / depth;
-            let k = self.scale * nearness;
-            Point::new(self.cx + k * p.x, self.cy - k * p.y, nearness, depth)
-        } else {
-            Point::new(self.cx + self.scale * p.x, self.cy - self.scale * p.y, -depth, depth)
-        }
+        let nearness = if self.pinhole { 1.0 / depth } else { -depth };
+        let k = if self.pinhole { self.scale * nearness } else { self.scale };
+        Point { x: self.cx + k * p.x, y: self.cy - k * p.y, nearness }
     }
 
     /// Depth from nearness.
@@ -106,7 +106,7 @@ impl Placement {
     }
 
     /// A mesh point in camera coordinates.
-    #[inline]
+    #[inline(always)]
     pub fn point(&self, p: DVec3) -> DVec3 {
         self.m * p + self.t
     }
@@ -115,13 +115,6 @@ impl Placement {
     #[inline]
     pub fn normal(&self, n: DVec3) -> DVec3 {
         self.cofactor * n
-    }
-
-    /// Positive where the outward normal `n` at `p` (mesh coordinates) faces the camera, zero at right angles to the
-    /// line of sight; linear in `p`.
-    #[inline]
-    pub fn facing(&self, n: DVec3, p: DVec3) -> f64 {
-        n.dot(self.view - p * self.bend)
     }
 }
 
@@ -153,30 +146,266 @@ impl DepthRange {
     }
 }
 
-/// Projects every vertex of a solid, instance after instance, into `out` (cleared first).
-pub(super) fn project(solid: &Solid, camera: &Camera, out: &mut Vec<Point>) -> DepthRange {
+/// The vertices of meshes in the image, in single precision: positions to 1e-7 of their distance from the image's corner, nearness
+/// to 1e-7 of itself. Rounded positions ([`Place`]) come from double precision. Lists are reused, so that nothing is allocated
+/// once they have grown.
+#[derive(Default)]
+pub(super) struct Projected {
+    x: Vec<f32>,
+    y: Vec<f32>,
+    nearness: Vec<f32>,
+    places: Vec<Place>,
+    /// Where the vertices of each mesh end, and whether all of them may be used.
+    meshes: Vec<(usize, bool)>,
+}
+
+/// The vertices of one mesh in the image.
+#[derive(Clone, Copy)]
+pub(super) struct Vertices<'a> {
+    x: &'a [f32],
+    y: &'a [f32],
+    nearness: &'a [f32],
+    places: &'a [Place],
+    /// Whether every vertex is in front of the near plane.
+    pub whole: bool,
+}
+
+impl Projected {
+    /// Forgets all meshes.
+    pub fn clear(&mut self) {
+        self.meshes.clear();
+    }
+
+    /// The vertices of the mesh that was projected as number `i`.
+    pub fn mesh(&self, i: usize) -> Vertices<'_> {
+        let first = i.checked_sub(1).and_then(|i| self.meshes.get(i)).map_or(0, |m| m.0);
+        let (past, whole) = self.meshes.get(i).copied().unwrap_or((first, true));
+        Vertices {
+            x: &self.x[first..past],
+            y: &self.y[first..past],
+            nearness: &self.nearness[first..past],
+            places: &self.places[first..past],
+            whole,
+        }
+    }
+
+    /// Projects the vertices of one mesh, after those of the meshes before.
+    pub fn add(&mut self, mesh: &Mesh, placement: &Placement, lens: &Lens) -> DepthRange {
+        let first = self.meshes.last().map_or(0, |m| m.0);
+        let needed = first + mesh.positions.len().next_multiple_of(LANES);
+        if self.x.len() < needed {
+            self.x.resize(needed, 0.0);
+            self.y.resize(needed, 0.0);
+            self.nearness.resize(needed, 0.0);
+            self.places.resize(needed, Place::ZERO);
+        }
+        let seen = vectorised(
+            #[inline(always)]
+            || match lens.pinhole {
+                true => self.write::<true>(first, &mesh.positions, placement, lens),
+                false => self.write::<false>(first, &mesh.positions, placement, lens),
+            },
+        );
+        self.meshes.push((first + mesh.positions.len(), seen.whole));
+        DepthRange { near: seen.near, far: seen.far }
+    }
+
+    #[inline(always)]
+    fn write<const PINHOLE: bool>(
+        &mut self,
+        first: usize,
+        positions: &[Vec3],
+        placement: &Placement,
+        lens: &Lens,
+    ) -> Seen {
+        let mut seen = Seen { near: f64::INFINITY, far: f64::NEG_INFINITY, whole: true };
+        // By value, so that it is plain that nothing written changes them.
+        let (Placement { m, t, .. }, lens) = (*placement, Lens { pinhole: PINHOLE, ..*lens });
+        let rows = [0, 1, 2].map(|r| [m.x_axis[r], m.y_axis[r], m.z_axis[r], t[r]]);
+        let lists = groups(&mut self.x[first..])
+            .zip(groups(&mut self.y[first..]))
+            .zip(groups(&mut self.nearness[first..]))
+            .zip(groups(&mut self.places[first..]));
+        for (group, (((x, y), nearness), places)) in groups_of(positions).zip(lists) {
+            let [px, py, pz] = coordinates(&group);
+            let [mut cx, mut cy, mut depth] = [[0.0; LANES]; 3];
+            let mut inside = true;
+            for i in 0..LANES {
+                let [vx, vy, vz] = rows.map(|[a, b, c, t]| px[i] * a + py[i] * b + pz[i] * c + t);
+                // Written so that NaN fails it.
+                inside &= (vx.abs() < HUGE) & (vy.abs() < HUGE) & (vz.abs() < HUGE) & (-vz >= Camera::NEAR);
+                (cx[i], cy[i], depth[i]) = (vx, vy, -vz);
+            }
+            if !inside {
+                seen.whole = false;
+                for i in 0..LANES {
+                    let point = seen.odd(&lens, DVec3::new(cx[i], cy[i], -depth[i]));
+                    (x[i], y[i], nearness[i]) = (point.x as f32, point.y as f32, point.nearness as f32);
+                    places[i] = place(point.x, point.y);
+                }
+                continue;
+            }
+            let [mut u, mut v] = [[0.0f32; LANES]; 2];
+            for i in 0..LANES {
+                let near = if PINHOLE { 1.0 / depth[i] } else { -depth[i] };
+                let scale = if PINHOLE { lens.scale * near } else { lens.scale };
+                let at = [lens.cx + scale * cx[i], lens.cy - scale * cy[i]];
+                (x[i], y[i], nearness[i]) = (at[0] as f32, at[1] as f32, near as f32);
+                (u[i], v[i]) = (rounded(at[0]), rounded(at[1]));
+            }
+            for i in 0..LANES {
+                places[i] = Place::new(u[i], v[i], -u[i], -v[i]);
+            }
+            for depth in depth {
+                seen.near = if depth < seen.near { depth } else { seen.near };
+                seen.far = if depth > seen.far { depth } else { seen.far };
+            }
+        }
+        seen
+    }
+}
+
+/// A list in groups, the last one cut off.
+#[inline(always)]
+fn groups<T>(list: &mut [T]) -> std::slice::IterMut<'_, [T; LANES]> {
+    list.as_chunks_mut().0.iter_mut()
+}
+
+/// What was seen of the vertices.
+struct Seen {
+    /// Least and greatest depth.
+    near: f64,
+    far: f64,
+    /// Whether all are in view.
+    whole: bool,
+}
+
+impl Seen {
+    /// A vertex of which it is not known whether it is in view.
+    #[inline(never)]
+    fn odd(&mut self, lens: &Lens, p: DVec3) -> Point {
+        if !(p.x.abs() < HUGE && p.y.abs() < HUGE && p.z.abs() < HUGE) {
+            return Point { x: 0.0, y: 0.0, nearness: f64::NAN };
+        }
+        if -p.z < Camera::NEAR {
+            return Point { x: 0.0, y: 0.0, nearness: f64::INFINITY };
+        }
+        self.near = self.near.min(-p.z);
+        self.far = self.far.max(-p.z);
+        lens.point(p)
+    }
+}
+
+impl Vertices<'_> {
+    /// The number of vertices.
+    pub fn len(&self) -> usize {
+        self.x.len()
+    }
+
+    /// The rounded positions of a triangle's corners; `None` if there are no such vertices.
+    #[inline(always)]
+    pub fn places(&self, corners: &[u32; 3]) -> Option<[Place; 3]> {
+        match corners.map(|v| self.places.get(v as usize)) {
+            [Some(a), Some(b), Some(c)] => Some([*a, *b, *c]),
+            _ => None,
+        }
+    }
+
+    /// Width and height together of what lies around some vertices, in pixels.
+    pub fn span(&self, of: impl Iterator<Item = u32>) -> f32 {
+        let places = of.filter_map(|v| self.places.get(v as usize));
+        let least = places.fold(Place::INFINITY, |a, b| a.min(*b));
+        -(least.x + least.y + least.z + least.w)
+    }
+
+    /// The least coordinates of all rounded positions.
+    pub fn least(&self) -> Place {
+        self.places.iter().fold(Place::INFINITY, |a, b| a.min(*b))
+    }
+
+    /// A triangle ready to be drawn, if it is to be: see [`Triangle::new`].
+    #[inline(always)]
+    pub fn triangle(&self, topology: &Topology, face: u32, extent: Extent, back: f64) -> Option<Triangle> {
+        let corners = topology.triangles.get(face as usize)?;
+        Triangle::new(corners.map(|v| self.point(v)), self.places(corners)?, extent, back)
+    }
+
+    /// Where a vertex is; of one that is not in view, nearness is infinite (behind the near plane) or NaN (not usable).
+    #[inline(always)]
+    pub fn point(&self, v: u32) -> Point {
+        let at = |list: &[f32]| list.get(v as usize).map_or(f64::NAN, |x| f64::from(*x));
+        Point { x: at(self.x), y: at(self.y), nearness: at(self.nearness) }
+    }
+}
+
+/// Projects every vertex of a solid, instance after instance.
+pub(super) fn project(solid: &Solid, camera: &Camera, out: &mut Projected) -> DepthRange {
     out.clear();
+    let lens = Lens::new(camera);
     solid.instances().iter().fold(DepthRange::EMPTY, |range, instance| {
-        let placement = Placement::new(camera, &instance.affine);
-        range.and(&project_mesh(&instance.mesh, &placement, &Lens::new(camera), out))
+        range.and(&out.add(&instance.mesh, &Placement::new(camera, &instance.affine), &lens))
     })
 }
 
-/// Projects the vertices of one mesh to the end of `out`.
-pub(super) fn project_mesh(mesh: &Mesh, placement: &Placement, lens: &Lens, out: &mut Vec<Point>) -> DepthRange {
-    let mut range = DepthRange::EMPTY;
-    out.extend(mesh.positions.iter().map(|p| {
-        let p = placement.point(p.as_dvec3());
-        // Written so that NaN fails it.
-        if !(p.x.abs() < HUGE && p.y.abs() < HUGE && p.z.abs() < HUGE) {
-            return Point::new(0.0, 0.0, 0.0, f64::NAN);
-        }
-        if -p.z < Camera::NEAR {
-            return Point::new(0.0, 0.0, 0.0, -p.z);
-        }
-        range.near = range.near.min(-p.z);
-        range.far = range.far.max(-p.z);
-        lens.point(p)
-    }));
-    range
+/// Which vertices of a mesh show their front. Reused from mesh to mesh.
+#[derive(Default)]
+pub(super) struct Fronts {
+    /// Positive where the outward normal faces the eye, zero at right angles to the line of sight; linear in the position.
+    pub facing: Vec<f64>,
+    /// Whether it is not negative.
+    pub front: Vec<bool>,
+}
+
+impl Fronts {
+    /// Those of a mesh.
+    pub fn find(&mut self, mesh: &Mesh, placement: &Placement) {
+        let Fronts { facing, front } = self;
+        let count = mesh.positions.len().min(mesh.normals.len());
+        let room = count.next_multiple_of(LANES);
+        facing.resize(room, 0.0);
+        front.resize(room, false);
+        let Placement { view, bend, .. } = *placement;
+        vectorised(
+            #[inline(always)]
+            || {
+                let vectors = groups_of(&mesh.positions[..count]).zip(groups_of(&mesh.normals[..count]));
+                for ((p, n), (facing, front)) in vectors.zip(groups(facing).zip(groups(front))) {
+                    let ([px, py, pz], [nx, ny, nz]) = (coordinates(&p), coordinates(&n));
+                    for i in 0..LANES {
+                        facing[i] = nx[i] * (view.x - px[i] * bend)
+                            + ny[i] * (view.y - py[i] * bend)
+                            + nz[i] * (view.z - pz[i] * bend);
+                    }
+                    for i in 0..LANES {
+                        front[i] = facing[i] >= 0.0;
+                    }
+                }
+            },
+        );
+        facing.truncate(count);
+        front.truncate(count);
+    }
+}
+
+/// Vectors in groups, the last one filled up with its last vector.
+#[inline(always)]
+fn groups_of(vectors: &[Vec3]) -> impl Iterator<Item = Cow<'_, [Vec3; LANES]>> {
+    let (groups, tail) = vectors.as_chunks::<LANES>();
+    let last = tail.last().map(|last| {
+        let mut out = [*last; LANES];
+        out[..tail.len()].copy_from_slice(tail);
+        Cow::Owned(out)
+    });
+    groups.iter().map(Cow::Borrowed).chain(last)
+}
+
+/// The coordinates of vectors one by one, in double precision.
+#[inline(always)]
+fn coordinates(vectors: &[Vec3; LANES]) -> [[f64; LANES]; 3] {
+    let mut out = [[0.0; LANES]; 3];
+    for i in 0..LANES {
+        let v = vectors[i];
+        (out[0][i], out[1][i], out[2][i]) = (f64::from(v.x), f64::from(v.y), f64::from(v.z));
+    }
+    out
 }

@@ -4,7 +4,7 @@
 //! order and at right angles to the contour, which is what counts. Which pieces are seen is taken as it is. Nothing is drawn:
 //! the pieces of the meshes are traced again, and those that were seen are told by their numbers.
 
-use super::project::{Lens, Placement, project_mesh};
+use super::project::{Fronts, Lens, Placement, Projected};
 use super::trace::{Origin, trace_mesh};
 use super::visibility::Piece;
 use super::{Camera, Contours};
@@ -27,19 +27,20 @@ impl Contours {
 
     /// Calls `f` for each piece with its instance, that one's first vertex among all, and where the piece comes from.
     fn origins(&self, solid: &Solid, camera: &Camera, mut f: impl FnMut(usize, &Instance, usize, &Origin)) {
-        let (mut points, mut facing) = (Vec::new(), Vec::new());
+        let (mut projected, mut fronts) = (Projected::default(), Fronts::default());
         let (mut next, mut base) = (0, 0);
         for instance in solid.instances() {
             let placement = Placement::new(camera, &instance.affine);
-            points.clear();
-            project_mesh(&instance.mesh, &placement, &Lens::new(camera), &mut points);
-            trace_mesh(&instance.mesh, &placement, camera, &points, &mut facing, |piece, origin| {
+            projected.clear();
+            projected.add(&instance.mesh, &placement, &Lens::new(camera));
+            let vertices = projected.mesh(0);
+            trace_mesh(&instance.mesh, &placement, camera, &vertices, &mut fronts, |piece, origin| {
                 if self.is(next, &piece) {
                     f(next, instance, base, origin);
                     next += 1;
                 }
             });
-            base += points.len();
+            base += vertices.len();
         }
     }
 

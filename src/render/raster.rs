@@ -3,8 +3,10 @@
 //! It does no shading and keeps no state. Which pixels a triangle covers is said in [`super::triangle`].
 
 use super::Camera;
-use super::project::{DepthRange, Lens, Placement, Point, project};
-use super::triangle::Triangle;
+use super::marks::Marks;
+use super::project::{DepthRange, Lens, Placement, Point, Projected, Vertices, project};
+use super::simd::vectorised;
+use super::triangle::{Extent, Triangle, place, size};
 use crate::geom::{Mesh, Solid};
 use glam::DVec3;
 
@@ -22,20 +24,16 @@ pub(super) struct Source<'a> {
 
 const WHOLE: [[f64; 3]; 3] = [[1.0, 0.0, 0.0], [0.0, 1.0, 0.0], [0.0, 0.0, 1.0]];
 
-/// Calls `draw` for each triangle that may touch the image, cut at the near plane. `points` are those of [`project`].
+/// Calls `draw` for each triangle that may touch the image, cut at the near plane. `projected` is that of [`project`].
 pub(super) fn each_triangle(
     solid: &Solid,
     camera: &Camera,
-    points: &[Point],
+    projected: &Projected,
     mut draw: impl FnMut(&Triangle, &Source<'_>),
 ) {
-    let mut base = 0;
     for (instance, item) in solid.instances().iter().enumerate() {
         let placement = &Placement::new(camera, &item.affine);
-        let count = item.mesh.positions.len();
-        let Some(points) = points.get(base..base + count) else { return };
-        base += count;
-        mesh_triangles(&item.mesh, placement, camera, points, |triangle, face, weights| {
+        mesh_triangles(&item.mesh, placement, camera, &projected.mesh(instance), |triangle, face, weights| {
             draw(triangle, &Source { instance, face, placement, weights });
         });
     }
@@ -46,51 +44,67 @@ fn mesh_triangles(
     mesh: &Mesh,
     placement: &Placement,
     camera: &Camera,
-    points: &[Point],
+    vertices: &Vertices<'_>,
     mut draw: impl FnMut(&Triangle, usize, [[f64; 3]; 3]),
 ) {
-    let (width, height) = (camera.width, camera.height);
-    // With the eye outside, the faces of a body that are turned away are hidden by others.
-    let fronts_only = mesh.topology.encloses && points.iter().all(|p| p.depth >= Camera::NEAR);
-    for (face, &[i, j, k]) in mesh.topology.triangles.iter().enumerate() {
-        let (Some(a), Some(b), Some(c)) = (points.get(i as usize), points.get(j as usize), points.get(k as usize))
-        else {
-            continue;
-        };
-        if fronts_only && turned_away(a, b, c, placement.mirrored) {
-            continue;
-        }
-        if a.depth >= Camera::NEAR && b.depth >= Camera::NEAR && c.depth >= Camera::NEAR {
-            if let Some(triangle) = Triangle::new([*a, *b, *c], width, height) {
-                draw(&triangle, face, WHOLE);
-            }
-        } else if a.depth >= Camera::NEAR || b.depth >= Camera::NEAR || c.depth >= Camera::NEAR {
-            if a.depth.is_nan() || b.depth.is_nan() || c.depth.is_nan() {
-                continue;
-            }
-            let corners = [i, j, k].map(|v| placement.point(mesh.positions[v as usize].as_dvec3()));
-            let (cut, n) = cut_near(&corners);
-            let lens = Lens::new(camera);
-            let corner = |w: &[f64; 3]| {
-                let p = corners[0] * w[0] + corners[1] * w[1] + corners[2] * w[2];
-                lens.point(DVec3::new(p.x, p.y, p.z.min(-Camera::NEAR)))
-            };
-            for m in 2..n {
-                let weights = [cut[0], cut[m - 1], cut[m]];
-                if let Some(triangle) = Triangle::new(weights.each_ref().map(corner), width, height) {
-                    draw(&triangle, face, weights);
-                }
-            }
+    if !vertices.whole {
+        return cut_triangles(mesh, placement, camera, vertices, draw);
+    }
+    let (size, back) = (size(camera.width, camera.height), back(mesh, placement, vertices));
+    for (face, corners) in mesh.topology.triangles.iter().enumerate() {
+        let Some(places) = vertices.places(corners) else { continue };
+        let extent = Extent::around(places, size);
+        if !extent.is_empty()
+            && let Some(triangle) = Triangle::new(corners.map(|v| vertices.point(v)), places, extent, back)
+        {
+            draw(&triangle, face, WHOLE);
         }
     }
 }
 
-/// Whether a triangle shows its back, or nothing. Counter-clockwise in the scene is clockwise in numbers of the image, whose y
-/// runs down.
-#[inline]
-fn turned_away(a: &Point, b: &Point, c: &Point, mirrored: bool) -> bool {
-    let area = (b.x - a.x) * (c.y - a.y) - (b.y - a.y) * (c.x - a.x);
-    if mirrored { area <= 0.0 } else { area >= 0.0 }
+/// Which way triangles turn that need not be drawn, as [`Triangle::new`] has it. With the eye outside, the faces of a body that
+/// are turned away are hidden by others. Counter-clockwise in the scene is counter-clockwise in the image, unless mirrored.
+fn back(mesh: &Mesh, placement: &Placement, vertices: &Vertices<'_>) -> f64 {
+    match mesh.topology.encloses && vertices.whole {
+        false => 0.0,
+        true if placement.mirrored => -1.0,
+        true => 1.0,
+    }
+}
+
+/// The triangles of a mesh with vertices that are not in front of the near plane.
+fn cut_triangles(
+    mesh: &Mesh,
+    placement: &Placement,
+    camera: &Camera,
+    vertices: &Vertices<'_>,
+    mut draw: impl FnMut(&Triangle, usize, [[f64; 3]; 3]),
+) {
+    let (size, lens) = (size(camera.width, camera.height), Lens::new(camera));
+    for (face, corners) in mesh.topology.triangles.iter().enumerate() {
+        let points = corners.map(|v| vertices.point(v));
+        if points.iter().any(|p| p.nearness.is_nan()) || points.iter().all(|p| p.nearness == f64::INFINITY) {
+            continue;
+        }
+        let corners = corners.map(|v| placement.point(mesh.positions[v as usize].as_dvec3()));
+        let (cut, n) = cut_near(&corners);
+        let corner = |w: &[f64; 3]| {
+            let p = corners[0] * w[0] + corners[1] * w[1] + corners[2] * w[2];
+            lens.point(DVec3::new(p.x, p.y, p.z.min(-Camera::NEAR)))
+        };
+        for m in 2..n {
+            let weights = [cut[0], cut[m - 1], cut[m]];
+            let points = weights.each_ref().map(corner);
+            let places = points.map(|p| place(p.x, p.y));
+            let points = points.map(Point::single);
+            let extent = Extent::around(places, size);
+            if !extent.is_empty()
+                && let Some(triangle) = Triangle::new(points, places, extent, 0.0)
+            {
+                draw(&triangle, face, weights);
+            }
+        }
+    }
 }
 
 /// The part of a triangle beyond the near plane as a polygon of at most four corners, each as weights.
@@ -120,18 +134,65 @@ fn cut_near(corners: &[DVec3; 3]) -> ([[f64; 3]; 4], usize) {
     (out, n)
 }
 
+/// The triangles of meshes that have pixels' centres between their corners, with where. Reused from picture to picture.
+#[derive(Default)]
+pub(super) struct Candidates {
+    faces: Vec<u32>,
+    extents: Vec<Extent>,
+    count: usize,
+}
+
+impl Candidates {
+    /// Those of one mesh all of whose vertices are in view.
+    pub fn find(&mut self, mesh: &Mesh, camera: &Camera, vertices: &Vertices<'_>) {
+        let triangles = &mesh.topology.triangles;
+        if self.faces.len() < triangles.len() {
+            self.faces.resize(triangles.len(), 0);
+            self.extents.resize(triangles.len(), Extent::default());
+        }
+        let (faces, extents) = (&mut self.faces[..], &mut self.extents[..]);
+        let size = size(camera.width, camera.height);
+        self.count = vectorised(
+            #[inline(always)]
+            || {
+                // Each is written down, and written over unless it counts: a branch could not be foretold.
+                let mut count = 0;
+                for (face, corners) in triangles.iter().enumerate() {
+                    let Some(places) = vertices.places(corners) else { continue };
+                    let extent = Extent::around(places, size);
+                    if let (Some(f), Some(e)) = (faces.get_mut(count), extents.get_mut(count)) {
+                        (*f, *e) = (face as u32, extent);
+                    }
+                    count += usize::from(!extent.is_empty());
+                }
+                count
+            },
+        );
+    }
+
+    /// Faces and their extents.
+    #[inline(always)]
+    fn iter(&self) -> impl Iterator<Item = (u32, Extent)> {
+        self.faces[..self.count].iter().copied().zip(self.extents[..self.count].iter().copied())
+    }
+}
+
 /// Draws nearness alone into `buffer` (row by row, refilled here) and returns the depth range of the vertices.
 pub(super) fn draw_nearness(
     solid: &Solid,
     camera: &Camera,
-    points: &mut Vec<Point>,
+    projected: &mut Projected,
+    candidates: &mut Candidates,
     buffer: &mut Vec<f32>,
 ) -> DepthRange {
-    let range = project(solid, camera, points);
+    let range = project(solid, camera, projected);
     buffer.clear();
     buffer.resize(camera.pixels(), empty(camera));
     let area = Area::whole(camera);
-    each_triangle(solid, camera, points, |triangle, _| triangle.fill(buffer, [area.left, area.right], area.top));
+    for (i, item) in solid.instances().iter().enumerate() {
+        let placement = Placement::new(camera, &item.affine);
+        fill_mesh(&item.mesh, &placement, camera, &projected.mesh(i), candidates, &area, buffer);
+    }
     range
 }
 
@@ -140,15 +201,71 @@ pub(super) fn draw_mesh(
     mesh: &Mesh,
     placement: &Placement,
     camera: &Camera,
-    points: &[Point],
+    vertices: &Vertices<'_>,
+    candidates: &mut Candidates,
     area: &Area,
     buffer: &mut Vec<f32>,
 ) {
     buffer.clear();
     buffer.resize(area.pixels(), empty(camera));
-    mesh_triangles(mesh, placement, camera, points, |triangle, _, _| {
-        triangle.fill(buffer, [area.left, area.right], area.top);
-    });
+    fill_mesh(mesh, placement, camera, vertices, candidates, area, buffer);
+}
+
+fn fill_mesh(
+    mesh: &Mesh,
+    placement: &Placement,
+    camera: &Camera,
+    vertices: &Vertices<'_>,
+    candidates: &mut Candidates,
+    area: &Area,
+    buffer: &mut [f32],
+) {
+    let (columns, top) = ([area.left, area.right], area.top);
+    if !vertices.whole {
+        return cut_triangles(mesh, placement, camera, vertices, |t, _, _| t.fill(buffer, columns, top));
+    }
+    candidates.find(mesh, camera, vertices);
+    let back = back(mesh, placement, vertices);
+    vectorised(
+        #[inline(always)]
+        || {
+            for (face, extent) in candidates.iter() {
+                if let Some(triangle) = vertices.triangle(&mesh.topology, face, extent, back) {
+                    triangle.fill(buffer, columns, top);
+                }
+            }
+        },
+    );
+}
+
+/// Draws the nearness of one mesh into an image, at the marked pixels; others may be drawn at or not. The candidates are those of the mesh, if all of its vertices are in view.
+pub(super) fn fill_some(
+    mesh: &Mesh,
+    placement: &Placement,
+    camera: &Camera,
+    vertices: &Vertices<'_>,
+    candidates: &Candidates,
+    marks: &Marks,
+    buffer: &mut [f32],
+) {
+    let width = camera.width as usize;
+    if !vertices.whole {
+        return cut_triangles(mesh, placement, camera, vertices, |t, _, _| t.fill_some(buffer, width, marks));
+    }
+    let back = back(mesh, placement, vertices);
+    vectorised(
+        #[inline(always)]
+        || {
+            for (face, extent) in candidates.iter() {
+                let [columns, rows] = extent.ends();
+                if marks.hold(columns, rows)
+                    && let Some(triangle) = vertices.triangle(&mesh.topology, face, extent, back)
+                {
+                    triangle.fill_some(buffer, width, marks);
+                }
+            }
+        },
+    );
 }
 
 /// A rectangle of pixels inside an image: columns `left..right`, rows `top..bottom`.
@@ -166,31 +283,18 @@ impl Area {
         Area { left: 0, right: camera.width as usize, top: 0, bottom: camera.height as usize }
     }
 
-    /// All pixels that a mesh with these vertices can reach, and a margin of one for what rounding may do along long
-    /// edges. The whole image if the near plane cuts the mesh.
-    pub fn around(points: &[Point], camera: &Camera) -> Area {
-        let (mut x, mut y) = ([f64::INFINITY, f64::NEG_INFINITY], [f64::INFINITY, f64::NEG_INFINITY]);
-        let mut behind = false;
-        for p in points {
-            if p.depth >= Camera::NEAR {
-                x = [x[0].min(p.x), x[1].max(p.x)];
-                y = [y[0].min(p.y), y[1].max(p.y)];
-            } else {
-                behind |= !p.depth.is_nan();
-            }
+    /// All pixels that a mesh with these vertices can reach. The whole image if some of them are behind the near plane or not
+    /// usable and others are in view.
+    pub fn around(vertices: &Vertices<'_>, camera: &Camera) -> Area {
+        if !vertices.whole {
+            let any = (0..vertices.len() as u32).any(|v| vertices.point(v).nearness < f64::INFINITY);
+            return if any { Area::whole(camera) } else { Area::default() };
         }
-        // Nothing to draw.
-        if x[0] > x[1] {
+        let extent = Extent::between(vertices.least(), size(camera.width, camera.height));
+        if vertices.len() == 0 || extent.is_empty() {
             return Area::default();
         }
-        if behind {
-            return Area::whole(camera);
-        }
-        let span = |[low, high]: [f64; 2], side: u32| {
-            let (from, to) = (first_centre(low - 1.0, side) as usize, first_centre(high + 1.0, side) as usize);
-            (from, to.max(from))
-        };
-        let ((left, right), (top, bottom)) = (span(x, camera.width), span(y, camera.height));
+        let [[left, right], [top, bottom]] = extent.ends();
         Area { left, right, top, bottom }
     }
 
@@ -212,17 +316,6 @@ impl Area {
     pub fn pixels(&self) -> usize {
         (self.right - self.left) * (self.bottom - self.top)
     }
-}
-
-/// The first pixel whose centre is not before `at`, from 0 to `side`. The same as rounding up, without a call to the
-/// library: NaN gives 0.
-#[inline]
-fn first_centre(at: f64, side: u32) -> u32 {
-    let (at, side) = (at - 0.5, f64::from(side));
-    let at = if at > 0.0 { at } else { 0.0 };
-    let at = if at < side { at } else { side };
-    let whole = at as u32;
-    whole + u32::from(f64::from(whole) < at)
 }
 
 /// The nearness of a pixel that shows nothing.

@@ -4,7 +4,7 @@
 //! is. The motion of the outline is the business of [`View::pull_mask`].
 
 use super::View;
-use super::project::project;
+use super::project::{Projected, project};
 use super::raster::{each_triangle, empty};
 use glam::DVec3;
 
@@ -13,11 +13,11 @@ impl View {
     /// row by row, of the picture whose longer side has `size` pixels. What is not seen counts as 0.
     pub fn pull_depth(&self, size: u32, by_depth: &[f64]) -> Vec<DVec3> {
         let (solid, camera) = (self.solid(), self.camera().scaled_to(size));
-        let mut points = Vec::new();
-        project(solid, &camera, &mut points);
+        let mut projected = Projected::default();
+        project(solid, &camera, &mut projected);
         let mut nearest = vec![empty(&camera); camera.pixels()];
         let mut faces: Vec<Option<(usize, usize)>> = vec![None; camera.pixels()];
-        each_triangle(solid, &camera, &points, |triangle, source| {
+        each_triangle(solid, &camera, &projected, |triangle, source| {
             triangle.runs(|run| {
                 for column in run.from..run.to {
                     let i = run.row * camera.width as usize + column;

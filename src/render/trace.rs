@@ -4,14 +4,14 @@
 //! every piece is finite, inside the image, at most 1.5 pixels long, and a function of mesh, placement and camera alone.
 
 use super::Camera;
-use super::project::{Lens, Placement, Point};
+use super::project::{Fronts, Lens, Placement, Point, Vertices};
 use super::visibility::{Image, Look, Piece};
-use crate::geom::Mesh;
+use crate::geom::{Edge, Mesh};
 use glam::DVec3;
 
-/// Whether a point's image may be used.
+/// Whether a point is in view.
 fn usable(p: &Point) -> bool {
-    p.depth >= Camera::NEAR
+    p.nearness < f64::INFINITY
 }
 
 /// Where on the surface a piece comes from: a share of a segment between two points of a face or edge. Silhouettes wander over
@@ -28,25 +28,40 @@ pub(super) struct Origin {
     pub share: f64,
 }
 
-/// Calls `out` for every piece of a mesh, in the order of its faces and edges. `points` are its vertices in the image;
-/// `facing` is overwritten.
+/// Calls `out` for every piece of a mesh, in the order of its faces and edges. `vertices` are its own in the image; `fronts` is
+/// overwritten.
 pub(super) fn trace_mesh(
     mesh: &Mesh,
     placement: &Placement,
     camera: &Camera,
-    points: &[Point],
-    facing: &mut Vec<f64>,
+    vertices: &Vertices<'_>,
+    fronts: &mut Fronts,
     out: impl FnMut(Piece, &Origin),
 ) {
     let Some(image) = Image::new(camera.width, camera.height) else { return };
     let size = [f64::from(camera.width), f64::from(camera.height)];
-    Tracer { lens: Lens::new(camera), image, size, out }.mesh(mesh, placement, points, facing);
+    fronts.find(mesh, placement);
+    let (lens, facing) = (Lens::new(camera), &fronts.facing[..]);
+    let mut tracer = Tracer { mesh, placement, vertices, open: true, facing, lens, image, size, out };
+    // Through holes too small to be seen nothing is seen.
+    let hole = |line: &[Edge]| line.first().is_some_and(Edge::is_boundary) && !tracer.is_speck(line);
+    tracer.open = mesh.topology.edges.open() && mesh.topology.edges.lines().any(hole);
+    tracer.trace(&fronts.front);
 }
+
+/// Lines of edges, holes say, that are less than this high and wide together, in pixels, are left out.
+const SPECK: f32 = 0.1;
 
 /// A segment's corners and ends, as in [`Origin`].
 type Segment = ([u32; 3], [[f64; 3]; 2]);
 
-struct Tracer<F> {
+struct Tracer<'a, F> {
+    mesh: &'a Mesh,
+    placement: &'a Placement,
+    vertices: &'a Vertices<'a>,
+    /// Whether the mesh has boundaries that can be seen, so that insides of faces may be.
+    open: bool,
+    facing: &'a [f64],
     lens: Lens,
     image: Image,
     /// Pixels across and down.
@@ -54,46 +69,33 @@ struct Tracer<F> {
     out: F,
 }
 
-impl<F: FnMut(Piece, &Origin)> Tracer<F> {
-    fn mesh(&mut self, mesh: &Mesh, placement: &Placement, points: &[Point], facing: &mut Vec<f64>) {
-        let open = mesh.topology.edges.iter().any(|e| e.faces[1] == u32::MAX);
-        facing.clear();
-        facing.extend(
-            mesh.positions.iter().zip(&mesh.normals).map(|(p, n)| placement.facing(n.as_dvec3(), p.as_dvec3())),
-        );
-        for face in &mesh.topology.triangles {
-            let [Some(a), Some(b), Some(c)] = face.map(|v| facing.get(v as usize)) else { continue };
-            let signs = [*a >= 0.0, *b >= 0.0, *c >= 0.0];
-            if signs[0] != signs[1] || signs[0] != signs[2] {
+impl<F: FnMut(Piece, &Origin)> Tracer<'_, F> {
+    fn trace(&mut self, front: &[bool]) {
+        for face in &self.mesh.topology.triangles {
+            let [Some(&a), Some(&b), Some(&c)] = face.map(|v| front.get(v as usize)) else { continue };
+            if (a ^ b) | (a ^ c) {
                 // The corner that differs from the other two.
-                let odd = if signs[0] == signs[1] { 2 } else { usize::from(signs[0] == signs[2]) };
-                let order = [odd, (odd + 1) % 3, (odd + 2) % 3];
-                self.silhouette(mesh, placement, points, order.map(|i| face[i]), order.map(|i| [*a, *b, *c][i]), open);
+                let odd = if a == b { 2 } else { usize::from(a == c) };
+                self.silhouette([odd, (odd + 1) % 3, (odd + 2) % 3].map(|i| face[i]));
             }
         }
-        for edge in &mesh.topology.edges {
-            if edge.crease || edge.faces[1] == u32::MAX {
-                self.edge(mesh, placement, points, edge.vertices, edge.faces, open);
+        for line in self.mesh.topology.edges.lines() {
+            if !self.is_speck(line) {
+                line.iter().for_each(|edge| self.edge(edge.vertices, edge.faces));
             }
         }
     }
 
     /// The zero set in one face; the first corner's sign differs from the others'.
-    fn silhouette(
-        &mut self,
-        mesh: &Mesh,
-        placement: &Placement,
-        points: &[Point],
-        corners: [u32; 3],
-        facing: [f64; 3],
-        open: bool,
-    ) {
-        let own = corners.map(|v| points[v as usize]);
-        if own.iter().any(|p| p.depth.is_nan()) || !own.iter().any(usable) {
+    fn silhouette(&mut self, corners: [u32; 3]) {
+        let Tracer { mesh, placement, vertices, open, facing, .. } = *self;
+        let own = corners.map(|v| vertices.point(v));
+        if own.iter().any(|p| p.nearness.is_nan()) || !own.iter().any(usable) {
             return;
         }
         let p = corners.map(|v| mesh.positions[v as usize].as_dvec3());
-        let n = corners.map(|v| mesh.normals.get(v as usize).map_or(DVec3::ZERO, |n| n.as_dvec3()));
+        let n = corners.map(|v| mesh.normals[v as usize].as_dvec3());
+        let facing = corners.map(|v| facing[v as usize]);
         let share = |i: usize| facing[0] / (facing[0] - facing[i]);
         let (u, v) = (share(1), share(2));
         let (from, to) = (p[0] + (p[1] - p[0]) * u, p[0] + (p[2] - p[0]) * v);
@@ -116,22 +118,20 @@ impl<F: FnMut(Piece, &Origin)> Tracer<F> {
         };
         let flip = ty * direction[0] - tx * direction[1] < 0.0;
         let ends = [[1.0 - u, u, 0.0], [1.0 - v, 0.0, v]];
-        self.cut(&a, &b, if flip { [-tx, -ty] } else { [tx, ty] }, &look, false, (corners, ends));
+        self.cut(&a, &b, length, if flip { [-tx, -ty] } else { [tx, ty] }, &look, false, (corners, ends));
+    }
+
+    /// Whether a whole line of edges is too small to be seen.
+    fn is_speck(&self, line: &[Edge]) -> bool {
+        self.vertices.whole && self.vertices.span(line.iter().flat_map(|e| e.vertices)) < SPECK
     }
 
     /// A crease or boundary edge.
-    fn edge(
-        &mut self,
-        mesh: &Mesh,
-        placement: &Placement,
-        points: &[Point],
-        vertices: [u32; 2],
-        faces: [u32; 2],
-        open: bool,
-    ) {
+    fn edge(&mut self, vertices: [u32; 2], faces: [u32; 2]) {
+        let Tracer { mesh, placement, vertices: points, open, .. } = *self;
         let [Some(from), Some(to)] = vertices.map(|v| mesh.positions.get(v as usize)) else { return };
-        let ends = vertices.map(|v| points[v as usize]);
-        if ends.iter().any(|p| p.depth.is_nan()) || !ends.iter().any(usable) {
+        let ends = vertices.map(|v| points.point(v));
+        if ends.iter().any(|p| p.nearness.is_nan()) || !ends.iter().any(usable) {
             return;
         }
         let camera_ends = [placement.point(from.as_dvec3()), placement.point(to.as_dvec3())];
@@ -151,7 +151,7 @@ impl<F: FnMut(Piece, &Origin)> Tracer<F> {
             let towards = if self.lens.pinhole { -normal.dot(corners[0]) } else { normal.z };
             let front = (towards > 0.0) != placement.mirrored;
             any_front |= front;
-            let p = points[opposite as usize];
+            let p = points.point(opposite);
             if !usable(&p) {
                 continue;
             }
@@ -170,13 +170,13 @@ impl<F: FnMut(Piece, &Origin)> Tracer<F> {
             let look = Look::BothSides { direction, slack };
             let corners = [vertices[0], vertices[1], vertices[1]];
             let ends = [[1.0, 0.0, 0.0], [0.0, 1.0, 0.0]];
-            self.cut(&a, &b, if side < 0.0 { [-tx, -ty] } else { [tx, ty] }, &look, true, (corners, ends));
+            self.cut(&a, &b, length, if side < 0.0 { [-tx, -ty] } else { [tx, ty] }, &look, true, (corners, ends));
         }
     }
 
     /// A difference of nearness at a point as a difference of depth, at least 0.
     fn in_depth(&self, nearness: f64, at: &Point) -> f64 {
-        let depth = if self.lens.pinhole { nearness * at.depth * at.depth } else { nearness };
+        let depth = if self.lens.pinhole { nearness / (at.nearness * at.nearness) } else { nearness };
         depth.max(0.0)
     }
 
@@ -195,15 +195,19 @@ impl<F: FnMut(Piece, &Origin)> Tracer<F> {
         Some((self.lens.point(from), self.lens.point(to)))
     }
 
-    /// Clips a segment to the image and divides it.
-    fn cut(&mut self, a: &Point, b: &Point, tangent: [f64; 2], look: &Look, edge: bool, from: Segment) {
+    /// Clips a segment of some length to the image and divides it.
+    #[allow(clippy::too_many_arguments)]
+    fn cut(&mut self, a: &Point, b: &Point, length: f64, tangent: [f64; 2], look: &Look, edge: bool, from: Segment) {
         let (dx, dy) = (b.x - a.x, b.y - a.y);
-        let Some((t0, t1)) = clip(a, [dx, dy], self.size) else { return };
-        let length = (dx * dx + dy * dy).sqrt() * (t1 - t0);
+        let inside = |p: &Point| p.x >= 0.0 && p.y >= 0.0 && p.x <= self.size[0] && p.y <= self.size[1];
+        let part = if inside(a) && inside(b) { Some((0.0, 1.0)) } else { clip(a, [dx, dy], self.size) };
+        let Some((t0, t1)) = part else { return };
+        let length = length * (t1 - t0);
         if !(length > 1e-9 && length.is_finite()) {
             return;
         }
-        let pieces = (length + 0.5).floor().max(1.0);
+        // Most are less than a pixel long.
+        let pieces = if length < 1.5 { 1.0 } else { (length + 0.5).floor() };
         let step = (t1 - t0) / pieces;
         for i in 0..pieces as usize {
             let t = t0 + step * (i as f64 + 0.5);

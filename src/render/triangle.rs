@@ -5,12 +5,17 @@
 //! right of or below it (the top-left rule). Nearness comes from the corners as they were. Small triangles, nearly all of a fine
 //! mesh, are filled eight pixels at a time, others by runs: the same pixels and the same numbers.
 
+use super::marks::Marks;
 use super::project::Point;
+use glam::{Vec4, Vec4Swizzles};
+use pulp::bytemuck::cast;
+use std::cmp::Ordering;
+use wide::{f32x8, i32x8};
 
 /// Units of a rounded position in a pixel, as a power of two.
 const BITS: u32 = 10;
 const UNIT: i64 = 1 << BITS;
-/// Positions are kept inside this, in units.
+/// Corners are kept inside this, in units.
 const FARTHEST: i64 = 1 << 60;
 /// The longest side of a small triangle's rectangle, in pixels; its edges fit into 32 bits.
 const SMALL: usize = 16;
@@ -44,6 +49,78 @@ fn within(q: f32, [lo, hi]: [f32; 2]) -> f32 {
     if q < hi { q } else { hi }
 }
 
+/// A position relative to the centre of the first pixel, rounded to 1/1024 of a pixel: x, y, -x, -y, so that least and greatest
+/// are found in one go. Exact in single precision; what is [`BOUND`] or farther out is kept there.
+pub(super) type Place = Vec4;
+
+/// Beyond any image, in pixels.
+const BOUND: f32 = 16384.0;
+
+/// A coordinate in pixels, relative to the centre of the first one, rounded.
+#[inline(always)]
+pub(super) fn rounded(v: f64) -> f32 {
+    // Added and taken away, it leaves the nearest whole number.
+    const WHOLE: f64 = 6_755_399_441_055_744.0;
+    let (v, bound) = (v - 0.5, f64::from(BOUND));
+    let v = if v > -bound { v } else { -bound };
+    let v = if v < bound { v } else { bound };
+    (((v * UNIT as f64 + WHOLE) - WHOLE) / UNIT as f64) as f32
+}
+
+/// The place of a position in pixels.
+#[inline(always)]
+pub(super) fn place(x: f64, y: f64) -> Place {
+    let (x, y) = (rounded(x), rounded(y));
+    Vec4::new(x, y, -x, -y)
+}
+
+/// The columns and rows of pixels between some places, from the first one to that past the last one: left, top, right, bottom, as
+/// the lowest bits of numbers in single precision, which is how they come about.
+#[derive(Clone, Copy, Debug, Default)]
+pub(super) struct Extent(Vec4);
+
+/// The lowest bits of a sum with this are the nearest whole number, up to 16 of them.
+const LOW_BITS: f32 = 8_388_608.0;
+
+impl Extent {
+    /// The pixels of an image whose centres lie between the places with these least coordinates, as far as columns and rows tell.
+    /// `size` is width and height, twice.
+    #[inline(always)]
+    pub fn between(least: Place, size: Vec4) -> Extent {
+        // Whole numbers in these units are centres: upwards for the first one, downwards and one more for the one past the last.
+        const ALMOST: f32 = (UNIT - 1) as f32 / UNIT as f32;
+        let at = least * Vec4::new(1.0, 1.0, -1.0, -1.0) + Vec4::new(ALMOST, ALMOST, 1.0, 1.0);
+        let at = at.max(Vec4::ZERO).min(size);
+        let nearest = at + LOW_BITS;
+        Extent(nearest - Vec4::select((nearest - LOW_BITS).cmpgt(at), Vec4::ONE, Vec4::ZERO))
+    }
+
+    /// That of a triangle.
+    #[inline(always)]
+    pub fn around([a, b, c]: [Place; 3], size: Vec4) -> Extent {
+        Extent::between(a.min(b).min(c), size)
+    }
+
+    /// Whether there are no pixels.
+    #[inline(always)]
+    pub fn is_empty(&self) -> bool {
+        self.0.cmplt(self.0.zwxy()).bitmask() & 0b11 != 0b11
+    }
+
+    /// Columns and rows.
+    #[inline(always)]
+    pub fn ends(&self) -> [[usize; 2]; 2] {
+        let [left, top, right, bottom] = self.0.to_array().map(|v| usize::from(v.to_bits() as u16));
+        [[left, right], [top, bottom]]
+    }
+}
+
+/// Width and height of an image, twice.
+pub(super) fn size(width: u32, height: u32) -> Vec4 {
+    let (width, height) = (width as f32, height as f32);
+    Vec4::new(width, height, width, height)
+}
+
 /// One triangle, ready to be drawn.
 pub(super) struct Triangle {
     pub points: [Point; 3],
@@ -51,96 +128,82 @@ pub(super) struct Triangle {
     pub area: f64,
     /// Least and greatest nearness of the corners.
     limits: [f32; 2],
-    /// The corners in units, clockwise as seen in the image.
-    corners: [[i64; 2]; 3],
+    /// The corners' places, and positions in single precision.
+    corners: [(Place, [f32; 2]); 3],
+    /// Whether they lie clockwise as seen in the image.
+    clockwise: bool,
     columns: [usize; 2],
     rows: [usize; 2],
     small: bool,
 }
 
-impl Point {
-    /// The nearest position in units.
-    #[inline(always)]
-    fn units(&self) -> [i64; 2] {
-        let [x, y] = self.place;
-        let far = |at: i32| at == i32::MIN || at == i32::MAX;
-        if far(x) || far(y) { [rounded(self.x), rounded(self.y)] } else { [i64::from(x), i64::from(y)] }
-    }
-}
-
-/// The same where it does not fit into 32 bits.
-fn rounded(v: f64) -> i64 {
-    let v = v * UNIT as f64;
-    let half = if v < 0.0 { -0.5 } else { 0.5 };
-    ((v + half) as i64).clamp(-FARTHEST, FARTHEST)
-}
-
-/// The first pixel whose centre is not before a position in units, and the first whose centre is beyond another one, both from 0
-/// to `side`.
-#[inline(always)]
-fn between(least: i64, most: i64, side: u32) -> [usize; 2] {
-    let inside = |pixel: i64| pixel.clamp(0, i64::from(side)) as usize;
-    [inside((least + (UNIT / 2 - 1)) >> BITS), inside((most + UNIT / 2) >> BITS)]
-}
-
-/// A position in units that fits into 32 bits, or the nearest that does: then it may be farther out.
-#[inline(always)]
-pub(super) fn place(v: f64) -> i32 {
-    let v = v * UNIT as f64;
-    let half = if v < 0.0 { -0.5 } else { 0.5 };
-    (v + half) as i32
-}
-
-/// Whether the centre of a pixel of an image that is `side` pixels long may lie between three places. None lies beyond the border,
-/// nor within less than a pixel that has none.
-#[inline(always)]
-fn may_hold_centre(a: i32, b: i32, c: i32, side: u32) -> bool {
-    let (least, most) = (a.min(b).min(c), a.max(b).max(c));
-    // Neither end can overflow: what is farthest out is moved inward.
-    let first = (least.clamp(i32::MIN / 2, i32::MAX / 2) + (UNIT as i32 / 2 - 1)) >> BITS;
-    let past = (most.clamp(i32::MIN / 2, i32::MAX / 2) + UNIT as i32 / 2) >> BITS;
-    first.max(0) < past.min(side as i32)
-}
-
 /// The centre of a pixel in units.
 #[inline(always)]
-fn centre(pixel: usize) -> i64 {
-    ((pixel as i64) << BITS) + UNIT / 2
+fn centre(pixel: usize) -> i32 {
+    (pixel as i32) << BITS
+}
+
+/// A corner in units, also where its place cannot hold it.
+fn units((place, position): (Place, [f32; 2])) -> [i64; 2] {
+    let [x, y, ..] = place.to_array();
+    if is_near(place) {
+        return [x, y].map(|v| (v * UNIT as f32) as i64);
+    }
+    position.map(|v| {
+        let v = (f64::from(v) - 0.5) * UNIT as f64;
+        ((v + if v < 0.0 { -0.5 } else { 0.5 }) as i64).clamp(-FARTHEST, FARTHEST)
+    })
+}
+
+/// Whether a place, or the least coordinates of some, are not kept from being farther out.
+#[inline(always)]
+fn is_near(least: Place) -> bool {
+    least.cmpgt(Vec4::splat(-BOUND)).all()
+}
+
+/// Which way round corners lie in the image: above 0 clockwise, below counter-clockwise, 0 without area.
+#[inline(always)]
+fn turn(corners: &[(Place, [f32; 2]); 3], near: bool) -> f64 {
+    if !near {
+        return far_turn(corners);
+    }
+    // Differences of places are exact in single precision, their products in double precision.
+    let [a, b, c] = corners.map(|(place, _)| place);
+    let (b, c) = ((b - a).to_array().map(f64::from), (c - a).to_array().map(f64::from));
+    b[0] * c[1] - b[1] * c[0]
+}
+
+#[inline(never)]
+fn far_turn(corners: &[(Place, [f32; 2]); 3]) -> f64 {
+    let [a, b, c] = corners.map(|corner| units(corner).map(i128::from));
+    ((b[0] - a[0]) * (c[1] - a[1]) - (b[1] - a[1]) * (c[0] - a[0])).signum() as f64
 }
 
 impl Triangle {
-    /// `None` when no pixel centre of a `width` x `height` image can be inside.
+    /// `None` when it covers nothing. With `back`, also when it turns that way: clockwise in the image if above 0, the other way if
+    /// below.
     #[inline(always)]
-    pub fn new(points: [Point; 3], width: u32, height: u32) -> Option<Triangle> {
+    pub fn new(points: [Point; 3], places: [Place; 3], extent: Extent, back: f64) -> Option<Triangle> {
+        let [a, b, c] = places;
+        let least = a.min(b).min(c);
+        // Greatest coordinates less the least ones.
+        let wide = -(least + least.zwxy());
+        let small = wide.x < SMALL as f32 && wide.y < SMALL as f32;
+        let [a, b, c] = std::array::from_fn(|i| (places[i], [points[i].x as f32, points[i].y as f32]));
+        let turn = turn(&[a, b, c], is_near(least));
+        if turn == 0.0 || turn * back > 0.0 {
+            return None;
+        }
         let [p, q, r] = &points;
-        if !may_hold_centre(p.place[0], q.place[0], r.place[0], width)
-            || !may_hold_centre(p.place[1], q.place[1], r.place[1], height)
-        {
-            return None;
-        }
-        let [a, b, c] = points.each_ref().map(Point::units);
-        let least = |i: usize| a[i].min(b[i]).min(c[i]);
-        let most = |i: usize| a[i].max(b[i]).max(c[i]);
-        let (x, y) = ([least(0), most(0)], [least(1), most(1)]);
-        let (columns, rows) = (between(x[0], x[1], width), between(y[0], y[1], height));
-        if columns[0] >= columns[1] || rows[0] >= rows[1] {
-            return None;
-        }
-        let small = x[1] - x[0] < SMALL as i64 * UNIT && y[1] - y[0] < SMALL as i64 * UNIT;
-        let clockwise = if small {
-            ((b[0] - a[0]) * (c[1] - a[1]) - (b[1] - a[1]) * (c[0] - a[0])).signum()
-        } else {
-            let [a, b, c] = [a, b, c].map(|p| p.map(i128::from));
-            ((b[0] - a[0]) * (c[1] - a[1]) - (b[1] - a[1]) * (c[0] - a[0])).signum() as i64
-        };
         let area = (q.x - p.x) * (r.y - p.y) - (q.y - p.y) * (r.x - p.x);
-        if clockwise == 0 || area == 0.0 || !area.is_finite() {
+        if area == 0.0 || !area.is_finite() {
             return None;
         }
-        let lo = p.nearness.min(q.nearness).min(r.nearness) as f32;
-        let hi = p.nearness.max(q.nearness).max(r.nearness) as f32;
-        let corners = if clockwise > 0 { [a, b, c] } else { [a, c, b] };
-        Some(Triangle { points, limits: [lo, hi], area, corners, columns, rows, small })
+        let [p, q, r] = points.each_ref().map(|p| p.nearness as f32);
+        let (lo, hi) = (if p < q { p } else { q }, if p > q { p } else { q });
+        let limits = [if lo < r { lo } else { r }, if hi > r { hi } else { r }];
+        let [columns, rows] = extent.ends();
+        Some(Triangle { points, limits, area, corners: [a, b, c], clockwise: turn > 0.0, columns, rows, small })
     }
 
     /// Nearness at the first column by row, and its change from column to column.
@@ -157,42 +220,54 @@ impl Triangle {
 
     /// Edges as functions that are not negative inside: value at a pixel's centre, change by column, change by row.
     #[inline(always)]
-    fn edges<N: Copy + From<i32> + std::ops::Sub<Output = N> + std::ops::Mul<Output = N> + PartialOrd>(
-        corners: [[N; 2]; 3],
-        [x, y]: [N; 2],
-    ) -> [[N; 3]; 3] {
+    fn edges<N: Int>(&self, corners: [[N; 2]; 3], [x, y]: [N; 2]) -> [[N; 3]; 3] {
         let (zero, one, unit) = (N::from(0), N::from(1), N::from(UNIT as i32));
+        // Counter-clockwise, every edge runs the other way. No branches: they could not be foretold.
+        let way = N::from(2 * i32::from(self.clockwise) - 1);
         std::array::from_fn(|i| {
             let (p, q) = (corners[i], corners[(i + 1) % 3]);
-            let (dx, dy) = (q[0] - p[0], q[1] - p[1]);
+            let (dx, dy) = ((q[0] - p[0]) * way, (q[1] - p[1]) * way);
             // Left and top edges have the centres on them.
-            let has = dy < zero || (dy == zero && dx > zero);
-            let at = dx * (y - p[1]) - dy * (x - p[0]) - if has { zero } else { one };
+            let has = (dy < zero) | ((dy == zero) & (dx > zero));
+            let at = dx * (y - p[1]) - dy * (x - p[0]) + N::from(i32::from(has)) - one;
             [at, (zero - dy) * unit, dx * unit]
         })
     }
 
+    /// The edges of a small triangle at a pixel's centre in its first row: relative to that, everything fits.
+    #[inline(always)]
+    fn small_edges(&self, column: usize) -> [[i32; 3]; 3] {
+        // The lowest bits of a sum with this are the nearest whole number, also below zero.
+        const LOW_BITS: f32 = 12_582_912.0;
+        let start = Vec4::new(column as i32 as f32, self.rows[0] as i32 as f32, 0.0, 0.0);
+        let corners = self.corners.map(|(place, _)| {
+            let [x, y, ..] = ((place - start) * UNIT as f32 + LOW_BITS).to_array().map(|v| v.to_bits() as i32);
+            [x - LOW_BITS.to_bits() as i32, y - LOW_BITS.to_bits() as i32]
+        });
+        self.edges(corners, [0, 0])
+    }
+
     /// Calls `draw` for every row's run of pixels.
-    #[inline]
-    pub fn runs(&self, mut draw: impl FnMut(&Run)) {
+    pub fn runs(&self, draw: impl FnMut(&Run)) {
+        // Products of two differences must fit.
+        let corners = self.corners.map(units);
+        let near = corners.as_flattened().iter().all(|v| v.abs() < 1 << 29);
+        if near { self.runs_in(corners, draw) } else { self.runs_in(corners.map(|p| p.map(i128::from)), draw) }
+    }
+
+    fn runs_in<N: Int>(&self, corners: [[N; 2]; 3], mut draw: impl FnMut(&Run)) {
         let (row_nearness, step) = self.plane();
-        let [first, past] = self.columns;
-        let start = [centre(first), centre(self.rows[0])].map(i128::from);
-        let mut edges = Triangle::edges(self.corners.map(|p| p.map(i128::from)), start);
-        for row in self.rows[0]..self.rows[1] {
-            let (mut from, mut to) = (first as i128, past as i128);
-            for [at, by_column, by_row] in &mut edges {
-                match (*by_column).signum() {
-                    1 => from = from.max(first as i128 - quotient(*at, *by_column)),
-                    -1 => to = to.min(first as i128 + quotient(*at, -*by_column) + 1),
-                    _ if *at < 0 => to = from,
-                    _ => {}
-                }
-                *at += *by_row;
+        let Triangle { columns: [first, past], rows, .. } = *self;
+        let start = [centre(first), centre(rows[0])].map(N::from);
+        let mut edges = self.edges(corners, start).map(Crossing::new);
+        for row in rows[0]..rows[1] {
+            let (mut from, mut to) = (N::from(0), N::from((past - first) as i32));
+            for edge in &mut edges {
+                edge.narrow(&mut from, &mut to);
             }
             if from < to {
-                let (nearness, limits) = (row_nearness(row), self.limits);
-                draw(&Run { row, from: from as usize, to: to as usize, nearness, step, origin: first, limits });
+                let [from, to] = [from, to].map(|at| first + at.index());
+                draw(&Run { row, from, to, nearness: row_nearness(row), step, origin: first, limits: self.limits });
             }
         }
     }
@@ -201,18 +276,23 @@ impl Triangle {
     #[inline(always)]
     pub fn fill(&self, buffer: &mut [f32], [left, right]: [usize; 2], top: usize) {
         let width = right - left;
-        let inside = self.columns[0] >= left && self.columns[1] <= right && self.rows[0] >= top;
-        let count = self.columns[1] - self.columns[0];
-        if self.small && inside && width >= LANES {
+        let Triangle { columns: [first, past], rows, small, .. } = *self;
+        if small && first >= left && past <= right && rows[0] >= top && width >= LANES {
+            let plane = self.plane();
             // A second time for what is beyond the lanes.
-            let mut from = self.columns[0];
-            self.fill_lanes(buffer, left, width, top, from.min(right - LANES));
-            if count > LANES {
-                from += LANES;
-                self.fill_lanes(buffer, left, width, top, from.min(right - LANES));
+            self.fill_lanes(buffer, left, width, top, first.min(right - LANES), &plane);
+            if past - first > LANES {
+                self.fill_lanes(buffer, left, width, top, (first + LANES).min(right - LANES), &plane);
             }
             return;
         }
+        self.fill_runs(buffer, [left, right], top);
+    }
+
+    /// As [`Triangle::fill`]; out of the way of small triangles.
+    #[inline(never)]
+    fn fill_runs(&self, buffer: &mut [f32], [left, right]: [usize; 2], top: usize) {
+        let width = right - left;
         self.runs(|run| {
             let (from, to) = (run.from.max(left), run.to.min(right));
             if run.row < top || from >= to {
@@ -229,54 +309,158 @@ impl Triangle {
 
     /// The columns from one on, as many as there are lanes.
     #[inline(always)]
-    fn fill_lanes(&self, buffer: &mut [f32], left: usize, width: usize, top: usize, from: usize) {
-        let (row_nearness, step) = self.plane();
-        let start = [centre(from), centre(self.rows[0])];
-        // Relative to the first pixel everything fits.
-        let corners = self.corners.map(|p| [(p[0] - start[0]) as i32, (p[1] - start[1]) as i32]);
-        let edges = Triangle::edges(corners, [0, 0]);
-        let mut lanes: [[i32; LANES]; 3] =
-            edges.map(|[at, by_column, _]| std::array::from_fn(|i| at + by_column * i as i32));
-        let offset = from as i32 - self.columns[0] as i32;
-        let along: [f32; LANES] = std::array::from_fn(|i| step * (offset + i as i32) as f32);
-        let mut at = (self.rows[0] - top) * width + from - left;
-        for row in self.rows[0]..self.rows[1] {
+    fn fill_lanes(
+        &self,
+        buffer: &mut [f32],
+        left: usize,
+        width: usize,
+        top: usize,
+        from: usize,
+        (row_nearness, step): &(impl Fn(usize) -> f32, f32),
+    ) {
+        let Triangle { columns: [first, _], rows, .. } = *self;
+        let edges = self.small_edges(from);
+        let mut lanes = edges.map(|[at, c, _]| {
+            let four = i32x8::new([0, c, 2 * c, 3 * c, 4 * c, 5 * c, 6 * c, 7 * c]);
+            four + at
+        });
+        let by_row = edges.map(|[_, _, by_row]| i32x8::splat(by_row));
+        let offset = from as i32 - first as i32;
+        let along = (f32x8::new(std::array::from_fn(|i| i as f32)) + offset as f32) * step;
+        let [lo, hi] = self.limits.map(f32x8::splat);
+        let mut at = (rows[0] - top) * width + from - left;
+        for row in rows[0]..rows[1] {
             let Some(pixels) = buffer.get_mut(at..).and_then(|b| b.first_chunk_mut::<LANES>()) else { return };
-            let nearness = row_nearness(row);
-            for i in 0..LANES {
-                let q = within(nearness + along[i], self.limits);
-                let covered = (lanes[0][i] | lanes[1][i] | lanes[2][i]) >= 0;
-                pixels[i] = if covered & (q > pixels[i]) { q } else { pixels[i] };
-            }
-            for (lanes, [_, _, by_row]) in lanes.iter_mut().zip(&edges) {
-                lanes.iter_mut().for_each(|e| *e += by_row);
-            }
+            let there = f32x8::new(*pixels);
+            let q = (along + row_nearness(row)).fast_max(lo).fast_min(hi);
+            // Negative where one edge is.
+            let outside: f32x8 = cast((lanes[0] | lanes[1] | lanes[2]) >> 31);
+            *pixels = (q.simd_gt(there) & !outside).bitselect(q, there).to_array();
+            lanes = [lanes[0] + by_row[0], lanes[1] + by_row[1], lanes[2] + by_row[2]];
             at += width;
         }
     }
+
+    /// As [`Triangle::fill`] for a whole image of some columns, but pixels that are not marked need not be drawn.
+    #[inline(always)]
+    pub fn fill_some(&self, buffer: &mut [f32], width: usize, marks: &Marks) {
+        if self.small {
+            self.fill(buffer, [0, width], 0);
+        } else {
+            self.fill_some_runs(buffer, width, marks);
+        }
+    }
+
+    #[inline(never)]
+    fn fill_some_runs(&self, buffer: &mut [f32], width: usize, marks: &Marks) {
+        self.runs(|run| {
+            for from in (run.from..run.to).step_by(64) {
+                for i in bits(marks.window(run.row * width + from, (run.to - from).min(64))) {
+                    if let Some(pixel) = buffer.get_mut(run.row * width + from + i) {
+                        let q = run.nearness(from + i);
+                        *pixel = if q > *pixel { q } else { *pixel };
+                    }
+                }
+            }
+        });
+    }
 }
 
-/// The quotient, rounded down.
-#[inline]
-fn quotient(a: i128, b: i128) -> i128 {
-    match (i64::try_from(a), i64::try_from(b)) {
-        (Ok(a), Ok(b)) => i128::from(a.div_euclid(b)),
-        _ => a.div_euclid(b),
+/// The places of the bits that are set.
+#[inline(always)]
+pub(super) fn bits(mut word: u64) -> impl Iterator<Item = usize> {
+    std::iter::from_fn(move || {
+        let i = word.trailing_zeros();
+        word &= word.wrapping_sub(1);
+        (i < 64).then_some(i as usize)
+    })
+}
+
+/// Whole numbers of some width.
+trait Int:
+    Copy + Ord + From<i32> + std::ops::Add<Output = Self> + std::ops::Sub<Output = Self> + std::ops::Mul<Output = Self>
+{
+    /// The quotient by a positive number, rounded down, and the remainder.
+    fn divided(self, by: Self) -> (Self, Self);
+
+    /// As an index; it is one.
+    fn index(self) -> usize;
+}
+
+macro_rules! int {
+    ($($name:ty),*) => {$(
+        impl Int for $name {
+            fn divided(self, by: Self) -> (Self, Self) {
+                (self.div_euclid(by), self.rem_euclid(by))
+            }
+
+            fn index(self) -> usize {
+                self as usize
+            }
+        }
+    )*};
+}
+
+int!(i32, i64, i128);
+
+/// Where an edge crosses a row, kept by quotient and remainder so that rows need no division.
+struct Crossing<N> {
+    /// Which side is inside: to the right (1), to the left (-1), or one of both whole rows (0).
+    side: i32,
+    /// The edge's function where the row begins, divided by its change from column to column, which is `by`.
+    at: (N, N),
+    per_row: (N, N),
+    by: N,
+}
+
+impl<N: Int> Crossing<N> {
+    fn new([at, by_column, by_row]: [N; 3]) -> Crossing<N> {
+        let zero = N::from(0);
+        let (side, by) = match by_column.cmp(&zero) {
+            Ordering::Greater => (1, by_column),
+            Ordering::Less => (-1, zero - by_column),
+            Ordering::Equal => (0, N::from(1)),
+        };
+        Crossing { side, at: at.divided(by), per_row: by_row.divided(by), by }
+    }
+
+    /// Keeps of a row's columns those inside, and goes on to the next row.
+    fn narrow(&mut self, from: &mut N, to: &mut N) {
+        let (zero, one) = (N::from(0), N::from(1));
+        match self.side {
+            // Inside are columns c with at + c * by >= 0.
+            1 => *from = (*from).max(zero - self.at.0),
+            -1 => *to = (*to).min(self.at.0 + one),
+            _ if self.at.0 < zero => *to = *from,
+            _ => {}
+        }
+        self.at = (self.at.0 + self.per_row.0, self.at.1 + self.per_row.1);
+        if self.at.1 >= self.by {
+            self.at = (self.at.0 + one, self.at.1 - self.by);
+        }
     }
 }
 
 #[cfg(test)]
 mod tests {
     use super::*;
+    use crate::render::Camera;
+    use crate::render::testing::Uniform;
 
     fn at(x: f64, y: f64) -> Point {
-        Point { place: [place(x), place(y)], x, y, nearness: 1.0, depth: 1.0 }
+        Point { x, y, nearness: 1.0 }
+    }
+
+    fn triangle(points: [Point; 3], width: u32, height: u32) -> Option<Triangle> {
+        let places = points.map(|p| place(p.x, p.y));
+        let extent = Extent::around(places, size(width, height));
+        if extent.is_empty() { None } else { Triangle::new(points, places, extent, 0.0) }
     }
 
     fn cover(triangles: &[[Point; 3]], side: u32) -> Vec<u32> {
         let mut count = vec![0; (side * side) as usize];
         for t in triangles {
-            if let Some(t) = Triangle::new(*t, side, side) {
+            if let Some(t) = triangle(*t, side, side) {
                 t.runs(|run| {
                     for x in run.from..run.to {
                         count[run.row * side as usize + x] += 1;
@@ -289,15 +473,11 @@ mod tests {
 
     #[test]
     fn a_fan_of_triangles_covers_each_pixel_once() {
-        let mut state = 7u64;
-        let mut unit = || {
-            state = state.wrapping_mul(6364136223846793005).wrapping_add(1442695040888963407);
-            (state >> 11) as f64 / (1u64 << 53) as f64
-        };
+        let mut random = Uniform(7);
         for round in 0..200 {
             // Corners on quarter pixels every other time: centres lie exactly on edges.
             let mut place = |scale: f64| {
-                let v = unit() * scale;
+                let v = random.next() * scale;
                 if round % 2 == 0 { (v * 2.0).round() / 2.0 } else { v }
             };
             let middle = at(4.0 + place(8.0), 4.0 + place(8.0));
@@ -321,24 +501,23 @@ mod tests {
     /// Filled by lanes, by runs, and in part of the picture.
     #[test]
     fn small_triangles_are_filled_as_by_runs() {
-        let mut state = 3u64;
-        let mut unit = || {
-            state = state.wrapping_mul(6364136223846793005).wrapping_add(1442695040888963407);
-            (state >> 11) as f64 / (1u64 << 53) as f64
-        };
+        let mut random = Uniform(3);
         let (width, height) = (40, 30);
+        let mut marks = Marks::default();
+        marks.clear(&Camera::default_for(width, height));
+        (0..width * height).step_by(3).for_each(|pixel| marks.set(pixel));
         let mut drawn = 0;
         for round in 0..3000 {
             let size = [1.5, 7.0, 15.0, 30.0][round % 4];
-            let corner = [unit() * 44.0 - 2.0, unit() * 34.0 - 2.0];
+            let corner = [random.between(-2.0, 42.0), random.between(-2.0, 32.0)];
             let mut point = || {
-                let mut v = [corner[0] + size * (unit() - 0.5), corner[1] + size * (unit() - 0.5)];
+                let mut v = corner.map(|at| at + size * (random.next() - 0.5));
                 if round % 3 == 0 {
                     v = v.map(|v| (v * 2.0).round() / 2.0);
                 }
-                Point { place: v.map(place), x: v[0], y: v[1], nearness: 0.3 + unit(), depth: 1.0 }
+                Point { x: v[0], y: v[1], nearness: 0.3 + random.next() }
             };
-            let Some(triangle) = Triangle::new([point(), point(), point()], width, height) else { continue };
+            let Some(triangle) = triangle([point(), point(), point()], width, height) else { continue };
             let (width, height) = (width as usize, height as usize);
             let mut by_lanes = vec![0.5f32; width * height];
             let mut by_runs = by_lanes.clone();
@@ -351,6 +530,10 @@ mod tests {
                 }
             });
             assert_eq!(by_lanes, by_runs, "round {round}");
+            let mut some = vec![0.5f32; width * height];
+            triangle.fill_some(&mut some, width, &marks);
+            let third = |list: &[f32]| list.iter().step_by(3).copied().collect::<Vec<_>>();
+            assert_eq!(third(&some), third(&by_runs), "round {round}");
             let [left, top] = [triangle.columns[0], triangle.rows[0]];
             let mut part = vec![0.5f32; (width - left) * (height - top)];
             triangle.fill(&mut part, [left, width], top);

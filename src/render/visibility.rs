@@ -64,6 +64,14 @@ pub(super) struct Piece {
     sides: [Side; 2],
 }
 
+impl Piece {
+    /// The pixel on the first or the second side that it looks at.
+    #[inline]
+    pub fn pixel(&self, side: usize) -> Option<u32> {
+        self.sides.get(side).map(|side| side.pixel).filter(|&pixel| pixel != NOWHERE)
+    }
+}
+
 /// Makes the pieces of an image.
 #[derive(Clone, Copy, Debug)]
 pub(super) struct Image {
@@ -144,9 +152,14 @@ impl<'a> Depths<'a> {
     /// Whether a piece is seen.
     #[inline]
     pub fn visible(&self, piece: &Piece) -> bool {
+        self.visible_by(piece, 0) || self.visible_by(piece, 1)
+    }
+
+    /// Whether a piece is seen by its look to the first or the second side.
+    #[inline]
+    pub fn visible_by(&self, piece: &Piece, side: usize) -> bool {
         let most = self.most[usize::from(piece.edge)];
-        let [first, second] = &piece.sides;
-        self.free(first, piece.depth, most) || (second.pixel != NOWHERE && self.free(second, piece.depth, most))
+        piece.sides.get(side).is_some_and(|s| s.pixel != NOWHERE && self.free(s, piece.depth, most))
     }
 }
 

@@ -159,7 +159,9 @@ impl Chamfer {
         self.options.truncate.map_or(d, |t| d.min(t))
     }
 
-    /// Distance at an element, and its derivatives per pixel of the frame and by the angle of the tangent.
+    /// Distance at an element, and its derivatives per pixel of the frame and by the angle of the tangent. Inlined, so that what is
+    /// not asked for is not computed.
+    #[inline(always)]
     fn read(&self, e: &Element) -> (f32, [f32; 3]) {
         let corners = self.grid.corners(e.x, e.y);
         let (d, dx, dy, turn) = if let [field] = self.fields.as_slice() {

@@ -1,0 +1,70 @@
+//! The depth of a few pixels: those that pieces of contour look at. The triangles that cover none of them are not drawn.
+//!
+//! Invariant: what is read of a pixel that was marked is what the whole depth image has there, bit for bit.
+
+use super::Camera;
+use super::frame::to_depth;
+use super::marks::Marks;
+use super::project::{Placement, Projected};
+use super::raster::{Candidates, empty, fill_some};
+use super::triangle::bits;
+use crate::geom::Solid;
+
+/// Marked pixels of an image, and their depth. Reused from image to image.
+#[derive(Default)]
+pub(super) struct Looked {
+    marks: Marks,
+    /// Nearness, then depth; of no meaning where there is no mark.
+    depth: Vec<f32>,
+    empty: f32,
+    /// The candidates of each mesh.
+    candidates: Vec<Candidates>,
+}
+
+impl Looked {
+    /// Makes ready for a solid in a camera's image, without marks.
+    pub fn begin(&mut self, solid: &Solid, camera: &Camera, projected: &Projected) {
+        self.clear(camera);
+        let meshes = solid.instances();
+        if self.candidates.len() < meshes.len() {
+            self.candidates.resize_with(meshes.len(), Candidates::default);
+        }
+        for (i, (item, candidates)) in meshes.iter().zip(&mut self.candidates).enumerate() {
+            candidates.find(&item.mesh, camera, &projected.mesh(i));
+        }
+    }
+
+    /// Removes all marks.
+    pub fn clear(&mut self, camera: &Camera) {
+        self.marks.clear(camera);
+        if self.depth.len() < camera.pixels() {
+            self.depth.resize(camera.pixels(), 0.0);
+        }
+        self.empty = empty(camera);
+    }
+
+    /// Marks a pixel.
+    #[inline]
+    pub fn mark(&mut self, pixel: u32) {
+        self.marks.set(pixel);
+        if let Some(depth) = self.depth.get_mut(pixel as usize) {
+            *depth = self.empty;
+        }
+    }
+
+    /// Draws the solid at the marked pixels, and says what depth they have: entries of an image of which the others mean nothing.
+    pub fn draw(&mut self, solid: &Solid, camera: &Camera, projected: &Projected) -> &[f32] {
+        let Looked { marks, depth, candidates, .. } = self;
+        let depth = &mut depth[..camera.pixels()];
+        for (i, (item, candidates)) in solid.instances().iter().zip(candidates).enumerate() {
+            let (placement, vertices) = (Placement::new(camera, &item.affine), projected.mesh(i));
+            fill_some(&item.mesh, &placement, camera, &vertices, candidates, marks, depth);
+        }
+        for (i, word) in marks.words().iter().enumerate() {
+            for bit in bits(*word) {
+                to_depth(camera, &mut depth[i * 64 + bit..][..1]);
+            }
+        }
+        depth
+    }
+}

@@ -1,0 +1,28 @@
+//! Loops over many numbers, with the widest instructions that the processor has.
+//!
+//! The same code is compiled twice, plainly and for AVX2, and chosen at run time. Nothing is fused or reordered, so both give the
+//! same bits.
+
+/// Runs `work`, compiled for the processor's widest instructions as far as it is inlined.
+#[inline]
+pub(super) fn vectorised<R>(work: impl FnOnce() -> R) -> R {
+    #[cfg(test)]
+    if PORTABLE.get() {
+        return work();
+    }
+    pulp::Arch::new().dispatch(work)
+}
+
+#[cfg(test)]
+thread_local! {
+    static PORTABLE: std::cell::Cell<bool> = const { std::cell::Cell::new(false) };
+}
+
+/// Runs `work` as on a processor without wide instructions.
+#[cfg(test)]
+pub(super) fn portable<R>(work: impl FnOnce() -> R) -> R {
+    PORTABLE.set(true);
+    let out = work();
+    PORTABLE.set(false);
+    out
+}
