@@ -30,7 +30,7 @@ impl Looked {
             self.candidates.resize_with(meshes.len(), Candidates::default);
         }
         for (i, (item, candidates)) in meshes.iter().zip(&mut self.candidates).enumerate() {
-            candidates.find(&item.mesh, camera, &projected.mesh(i));
+            candidates.find(&item.mesh, &Placement::new(camera, &item.affine), camera, &projected.mesh(i));
         }
     }
 

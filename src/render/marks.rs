@@ -11,22 +11,24 @@ pub(super) struct Marks {
     blocks: Vec<u64>,
     /// Blocks in a row.
     stride: usize,
-    /// By squares of [`SQUARES`] pixels a side, whether there is a mark in the square or in those to the right, below, or both; there
-    /// is a row of squares above the image and a column before it.
-    near: [Vec<bool>; SQUARES.len()],
+    /// By squares of 8 and of 16 pixels a side.
+    near: [Near; 2],
     width: u32,
 }
 
-/// Sides of squares, as powers of two.
-const SQUARES: [u32; 2] = [3, 4];
+/// Whether there is a mark in a square of pixels or in those to the right, below, or both; there is a row of squares above the
+/// image and a column before it.
+#[derive(Default)]
+struct Near {
+    held: Vec<bool>,
+    /// Squares in a row.
+    stride: usize,
+    /// Their side, as a power of two.
+    shift: u32,
+}
 
 /// As many bytes as pixels in a block's row, each 1.
 const EACH_ROW: u64 = 0x0101_0101_0101_0101;
-
-/// Squares in a row or column, with one before the image and one beyond.
-fn squares(side: u32, shift: u32) -> usize {
-    (side >> shift) as usize + 2
-}
 
 impl Marks {
     /// Removes all marks, for a camera's image.
@@ -37,9 +39,11 @@ impl Marks {
         self.words.resize(camera.pixels() / 64 + 2, 0);
         self.blocks.clear();
         self.blocks.resize(self.stride * (camera.height as usize / 8 + 2), 0);
-        for (near, shift) in self.near.iter_mut().zip(SQUARES) {
-            near.clear();
-            near.resize(squares(camera.width, shift) * squares(camera.height, shift), false);
+        for (near, shift) in self.near.iter_mut().zip([3, 4]) {
+            let [columns, rows] = [camera.width, camera.height].map(|side| (side >> shift) as usize + 2);
+            (near.stride, near.shift) = (columns, shift);
+            near.held.clear();
+            near.held.resize(columns * rows, false);
         }
     }
 
@@ -52,12 +56,11 @@ impl Marks {
             *word |= 1 << (pixel % 64);
             *block |= 1 << (8 * (y % 8) + x % 8);
         }
-        for (near, shift) in self.near.iter_mut().zip(SQUARES) {
-            let stride = squares(self.width, shift);
-            let at = ((y >> shift) as usize + 1) * stride + (x >> shift) as usize + 1;
-            for at in [at, at - 1, at - stride, at - stride - 1] {
-                if let Some(near) = near.get_mut(at) {
-                    *near = true;
+        for Near { held, stride, shift } in &mut self.near {
+            let at = ((y >> *shift) as usize + 1) * *stride + (x >> *shift) as usize + 1;
+            for at in [at, at - 1, at - *stride, at - *stride - 1] {
+                if let Some(held) = held.get_mut(at) {
+                    *held = true;
                 }
             }
         }
@@ -82,13 +85,13 @@ impl Marks {
     pub fn hold(&self, [left, right]: [usize; 2], [top, bottom]: [usize; 2]) -> bool {
         let (columns, rows) = (right - left, bottom - top);
         // Quickly told for most: what is not longer than a square lies in four of them.
-        let i = usize::from(columns.max(rows) > 1 << SQUARES[0]);
-        let (near, shift) = (&self.near[i], SQUARES[i]);
-        let at = ((top >> shift) + 1) * squares(self.width, shift) + (left >> shift) + 1;
-        if !near.get(at).is_some_and(|near| *near) && columns.max(rows) <= 1 << SQUARES[1] {
+        let side = columns.max(rows);
+        let Near { stride, shift, held } = &self.near[usize::from(side > 8)];
+        let at = ((top >> shift) + 1) * stride + (left >> shift) + 1;
+        if side <= 16 && !held.get(at).is_some_and(|near| *near) {
             return false;
         }
-        if columns.max(rows) > 8 {
+        if side > 8 {
             return self.hold_many([left, right], [top, bottom]);
         }
         // At most two blocks each way.
@@ -98,8 +101,10 @@ impl Marks {
         let ([a, b], [c, d]) = (pair(at), pair(at + self.stride));
         let across = ((1u64 << columns) - 1) << (left % 8);
         let [first, second] = [across & 0xff, across >> 8].map(|row| row * EACH_ROW);
-        let down = ((1u128 << (8 * rows)) - 1) << (8 * (top % 8));
-        let (upper, lower) = (down as u64, (down >> 64) as u64);
+        let above = rows.min(8 - top % 8);
+        let upper = (u64::MAX >> (64 - 8 * above)) << (8 * (top % 8));
+        // Two shifts, since one of 64 is none.
+        let lower = (u64::MAX >> 1) >> (63 - 8 * (rows - above));
         (((a & first) | (b & second)) & upper) | (((c & first) | (d & second)) & lower) != 0
     }
 

@@ -8,7 +8,6 @@ use super::triangle::{Extent, Place, Triangle, place, rounded};
 use super::{Camera, Projection};
 use crate::geom::{Affine, Mesh, Solid, Topology};
 use glam::{DMat3, DVec3, Vec3};
-use std::borrow::Cow;
 
 /// Vertices worked on at a time: loops over them are long enough to be told from code that is written out, and short enough for
 /// the nearest cache.
@@ -226,8 +225,9 @@ impl Projected {
             .zip(groups(&mut self.y[first..]))
             .zip(groups(&mut self.nearness[first..]))
             .zip(groups(&mut self.places[first..]));
-        for (group, (((x, y), nearness), places)) in groups_of(positions).zip(lists) {
-            let [px, py, pz] = coordinates(&group);
+        let vectors = Groups::new(positions);
+        for (group, (((x, y), nearness), places)) in vectors.iter().zip(lists) {
+            let [px, py, pz] = coordinates(group);
             let [mut cx, mut cy, mut depth] = [[0.0; LANES]; 3];
             let mut inside = true;
             for i in 0..LANES {
@@ -368,9 +368,9 @@ impl Fronts {
         vectorised(
             #[inline(always)]
             || {
-                let vectors = groups_of(&mesh.positions[..count]).zip(groups_of(&mesh.normals[..count]));
-                for ((p, n), (facing, front)) in vectors.zip(groups(facing).zip(groups(front))) {
-                    let ([px, py, pz], [nx, ny, nz]) = (coordinates(&p), coordinates(&n));
+                let (p, n) = (Groups::new(&mesh.positions[..count]), Groups::new(&mesh.normals[..count]));
+                for ((p, n), (facing, front)) in p.iter().zip(n.iter()).zip(groups(facing).zip(groups(front))) {
+                    let ([px, py, pz], [nx, ny, nz]) = (coordinates(p), coordinates(n));
                     for i in 0..LANES {
                         facing[i] = nx[i] * (view.x - px[i] * bend)
                             + ny[i] * (view.y - py[i] * bend)
@@ -388,15 +388,25 @@ impl Fronts {
 }
 
 /// Vectors in groups, the last one filled up with its last vector.
-#[inline(always)]
-fn groups_of(vectors: &[Vec3]) -> impl Iterator<Item = Cow<'_, [Vec3; LANES]>> {
-    let (groups, tail) = vectors.as_chunks::<LANES>();
-    let last = tail.last().map(|last| {
-        let mut out = [*last; LANES];
-        out[..tail.len()].copy_from_slice(tail);
-        Cow::Owned(out)
-    });
-    groups.iter().map(Cow::Borrowed).chain(last)
+struct Groups<'a> {
+    whole: &'a [[Vec3; LANES]],
+    last: [Vec3; LANES],
+    count: usize,
+}
+
+impl<'a> Groups<'a> {
+    #[inline(always)]
+    fn new(vectors: &'a [Vec3]) -> Groups<'a> {
+        let (whole, tail) = vectors.as_chunks();
+        let mut last = [tail.last().copied().unwrap_or_default(); LANES];
+        last[..tail.len()].copy_from_slice(tail);
+        Groups { whole, last, count: whole.len() + usize::from(!tail.is_empty()) }
+    }
+
+    #[inline(always)]
+    fn iter(&self) -> impl Iterator<Item = &[Vec3; LANES]> {
+        (0..self.count).map(|i| self.whole.get(i).unwrap_or(&self.last))
+    }
 }
 
 /// The coordinates of vectors one by one, in double precision.

@@ -6,9 +6,9 @@ use super::Camera;
 use super::marks::Marks;
 use super::project::{DepthRange, Lens, Placement, Point, Projected, Vertices, project};
 use super::simd::vectorised;
-use super::triangle::{Extent, Triangle, place, size};
+use super::triangle::{Extent, Triangle, is_turned, place, size};
 use crate::geom::{Mesh, Solid};
-use glam::DVec3;
+use glam::{DVec3, Vec4};
 
 /// What a triangle is, besides its corners in the image.
 pub(super) struct Source<'a> {
@@ -143,31 +143,43 @@ pub(super) struct Candidates {
 }
 
 impl Candidates {
-    /// Those of one mesh all of whose vertices are in view.
-    pub fn find(&mut self, mesh: &Mesh, camera: &Camera, vertices: &Vertices<'_>) {
+    /// Those of one mesh all of whose vertices are in view, but for backs that need not be drawn.
+    pub fn find(&mut self, mesh: &Mesh, placement: &Placement, camera: &Camera, vertices: &Vertices<'_>) {
         let triangles = &mesh.topology.triangles;
         if self.faces.len() < triangles.len() {
             self.faces.resize(triangles.len(), 0);
             self.extents.resize(triangles.len(), Extent::default());
         }
-        let (faces, extents) = (&mut self.faces[..], &mut self.extents[..]);
-        let size = size(camera.width, camera.height);
+        let (size, back) = (size(camera.width, camera.height), back(mesh, placement, vertices));
         self.count = vectorised(
             #[inline(always)]
-            || {
-                // Each is written down, and written over unless it counts: a branch could not be foretold.
-                let mut count = 0;
-                for (face, corners) in triangles.iter().enumerate() {
-                    let Some(places) = vertices.places(corners) else { continue };
-                    let extent = Extent::around(places, size);
-                    if let (Some(f), Some(e)) = (faces.get_mut(count), extents.get_mut(count)) {
-                        (*f, *e) = (face as u32, extent);
-                    }
-                    count += usize::from(!extent.is_empty());
-                }
-                count
+            || match back {
+                0.0 => self.write::<false>(triangles, vertices, size, back),
+                _ => self.write::<true>(triangles, vertices, size, back),
             },
         );
+    }
+
+    #[inline(always)]
+    fn write<const FRONTS: bool>(
+        &mut self,
+        triangles: &[[u32; 3]],
+        vertices: &Vertices<'_>,
+        size: Vec4,
+        back: f64,
+    ) -> usize {
+        let (faces, extents) = (&mut self.faces[..], &mut self.extents[..]);
+        // Each is written down, and written over unless it counts: a branch could not be foretold.
+        let mut count = 0;
+        for (face, corners) in triangles.iter().enumerate() {
+            let Some(places) = vertices.places(corners) else { continue };
+            let extent = Extent::around(places, size);
+            if let (Some(f), Some(e)) = (faces.get_mut(count), extents.get_mut(count)) {
+                (*f, *e) = (face as u32, extent);
+            }
+            count += usize::from(!extent.is_empty() & !(FRONTS && is_turned(places, back)));
+        }
+        count
     }
 
     /// Faces and their extents.
@@ -224,7 +236,7 @@ fn fill_mesh(
     if !vertices.whole {
         return cut_triangles(mesh, placement, camera, vertices, |t, _, _| t.fill(buffer, columns, top));
     }
-    candidates.find(mesh, camera, vertices);
+    candidates.find(mesh, placement, camera, vertices);
     let back = back(mesh, placement, vertices);
     vectorised(
         #[inline(always)]

@@ -173,6 +173,14 @@ fn turn(corners: &[(Place, [f32; 2]); 3], near: bool) -> f64 {
     b[0] * c[1] - b[1] * c[0]
 }
 
+/// Whether corners are known to turn that way, as [`Triangle::new`] has it.
+#[inline(always)]
+pub(super) fn is_turned(places: [Place; 3], back: f64) -> bool {
+    let [a, b, c] = places;
+    let corners = places.map(|place| (place, [0.0; 2]));
+    is_near(a.min(b).min(c)) & (turn(&corners, true) * back > 0.0)
+}
+
 #[inline(never)]
 fn far_turn(corners: &[(Place, [f32; 2]); 3]) -> f64 {
     let [a, b, c] = corners.map(|corner| units(corner).map(i128::from));
