@@ -5,7 +5,8 @@
 //! DATA_DIR holds `vase.bin`, `body.bin`, `dense.bin` (two u32 counts, float32 vertices, u32 triangles) and `poses.bin` (row-major
 //! 4 x 4 float32). The camera is at the origin and looks along -z, 45 degrees from top to bottom. Each evaluation has another pose.
 //! Prints one JSON line for each mesh, size and task: `depth`, `contour` (contour pieces, for us; contour pixels, for the plain one)
-//! and `likelihood` (their mean distance from the contours of the last pose).
+//! `likelihood` (their mean distance from the contours of the last pose), and `likelihood_newmesh` (with other vertices each time
+//! too, whose normals are worked out each time; ours alone).
 
 mod clock;
 #[path = "render_kit/plain.rs"]
@@ -160,11 +161,37 @@ fn ours(case: &Case<'_>, solid: &Solid, raw: &Raw, poses: &[Pose], last: &Pose) 
     };
     let chamfer = Chamfer::prepare(&observed, case.size, case.size, &ChamferOptions::default())?;
     let mut scratch = Scratch::default();
-    case.measure("pcadlang", "likelihood", "", |i| {
-        let contours = Contours::of(&at(i), &camera);
+    let mut likelihood = |solid: &Solid| {
+        let contours = Contours::of(solid, &camera);
         std::hint::black_box(chamfer.log_likelihood_with(&elements(&contours), &mut scratch));
+    };
+    case.measure("pcadlang", "likelihood", "", |i| likelihood(&at(i)));
+    let Some(mesh) = solid.instances().first().map(|i| Arc::clone(&i.mesh)) else { return Ok(()) };
+    let shapes: Vec<Vec<Vec3>> = (0..16).map(|k| deformed(&mesh, k)).collect();
+    case.measure("pcadlang", "likelihood_newmesh", "", |i| {
+        let positions = shapes[i % shapes.len()].clone();
+        let normals = normals(&positions, &mesh.topology.triangles);
+        let solid = Solid::new(Arc::new(Mesh { positions, normals, topology: Arc::clone(&mesh.topology) }));
+        likelihood(&placed(&solid, &poses[i % poses.len()]));
     });
     Ok(())
+}
+
+/// Another shape of a mesh: narrower and wider by height.
+fn deformed(mesh: &Mesh, k: usize) -> Vec<Vec3> {
+    let scale = |p: &Vec3| 1.0 + 0.06 * libm::sinf(3.0 * p.y + k as f32);
+    mesh.positions.iter().map(|p| Vec3::new(p.x * scale(p), p.y, p.z * scale(p))).collect()
+}
+
+/// A normal for each vertex: the mean over the faces around it, by area.
+fn normals(positions: &[Vec3], triangles: &[[u32; 3]]) -> Vec<Vec3> {
+    let mut sums = vec![Vec3::ZERO; positions.len()];
+    for t in triangles {
+        let [a, b, c] = t.map(|v| positions[v as usize]);
+        let normal = (b - a).cross(c - a);
+        t.iter().for_each(|v| sums[*v as usize] += normal);
+    }
+    sums.iter().map(|n| n.normalize_or(Vec3::Y)).collect()
 }
 
 fn theirs(case: &Case<'_>, raw: &Raw, poses: &[Pose], last: &Pose) {
