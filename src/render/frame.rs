@@ -6,6 +6,7 @@
 use super::Camera;
 use super::project::{Lens, Projected, project};
 use super::raster::{Candidates, draw_nearness, each_triangle, empty};
+use super::simd::vectorised;
 use crate::geom::Solid;
 use glam::{DVec3, Vec3};
 use std::cell::RefCell;
@@ -79,13 +80,23 @@ impl Frame {
     }
 }
 
+/// Depth from nearness.
+#[inline(always)]
+pub(super) fn depth_of(pinhole: bool, nearness: f32) -> f32 {
+    if pinhole { 1.0 / nearness } else { -nearness }
+}
+
 /// Nearness to depth, in place.
 pub(super) fn to_depth(camera: &Camera, buffer: &mut [f32]) {
-    if Lens::new(camera).pinhole {
-        buffer.iter_mut().for_each(|q| *q = 1.0 / *q);
-    } else {
-        buffer.iter_mut().for_each(|q| *q = -*q);
-    }
+    let pinhole = Lens::new(camera).pinhole;
+    vectorised(
+        #[inline(always)]
+        || {
+            for q in buffer.iter_mut() {
+                *q = depth_of(pinhole, *q);
+            }
+        },
+    );
 }
 
 fn draw_all(

@@ -9,6 +9,7 @@ use super::contours::Contours;
 use super::frame::to_depth;
 use super::project::{DepthRange, Fronts, Lens, Placement, Projected};
 use super::raster::{Area, Candidates, draw_mesh};
+use super::simd::vectorised;
 use super::trace::trace_mesh;
 use super::visibility::{Depths, Piece};
 use super::{Camera, Projection};
@@ -126,7 +127,10 @@ impl Layers {
             *shown = at;
             slot.used = self.clock;
             range = range.and(&slot.layer.range);
-            slot.layer.show(&mut self.depth, width);
+            vectorised(
+                #[inline(always)]
+                || slot.layer.show(&mut self.depth, width),
+            );
             self.drawn = self.drawn.with(&slot.layer.area);
         }
         range
@@ -196,6 +200,7 @@ impl Layer {
     }
 
     /// Puts what is nearer than the picture into it.
+    #[inline(always)]
     fn show(&self, picture: &mut [f32], width: usize) {
         let columns = self.area.right - self.area.left;
         if columns == 0 {

@@ -3,9 +3,9 @@
 //! Invariant: what is read of a pixel that was marked is what the whole depth image has there, bit for bit.
 
 use super::Camera;
-use super::frame::to_depth;
+use super::frame::depth_of;
 use super::marks::Marks;
-use super::project::{Placement, Projected};
+use super::project::{Lens, Placement, Projected};
 use super::raster::{Candidates, empty, fill_some};
 use super::triangle::bits;
 use crate::geom::Solid;
@@ -60,9 +60,11 @@ impl Looked {
             let (placement, vertices) = (Placement::new(camera, &item.affine), projected.mesh(i));
             fill_some(&item.mesh, &placement, camera, &vertices, candidates, marks, depth);
         }
+        let pinhole = Lens::new(camera).pinhole;
         for (i, word) in marks.words().iter().enumerate() {
             for bit in bits(*word) {
-                to_depth(camera, &mut depth[i * 64 + bit..][..1]);
+                let at = &mut depth[i * 64 + bit];
+                *at = depth_of(pinhole, *at);
             }
         }
         depth

@@ -11,8 +11,8 @@ pub(super) struct Marks {
     blocks: Vec<u64>,
     /// Blocks in a row.
     stride: usize,
-    /// By squares of 8 and of 16 pixels a side.
-    near: [Near; 2],
+    /// By squares of 4, 8 and 16 pixels a side.
+    near: [Near; 3],
     width: u32,
 }
 
@@ -39,7 +39,7 @@ impl Marks {
         self.words.resize(camera.pixels() / 64 + 2, 0);
         self.blocks.clear();
         self.blocks.resize(self.stride * (camera.height as usize / 8 + 2), 0);
-        for (near, shift) in self.near.iter_mut().zip([3, 4]) {
+        for (near, shift) in self.near.iter_mut().zip([2, 3, 4]) {
             let [columns, rows] = [camera.width, camera.height].map(|side| (side >> shift) as usize + 2);
             (near.stride, near.shift) = (columns, shift);
             near.held.clear();
@@ -86,7 +86,7 @@ impl Marks {
         let (columns, rows) = (right - left, bottom - top);
         // Quickly told for most: what is not longer than a square lies in four of them.
         let side = columns.max(rows);
-        let Near { stride, shift, held } = &self.near[usize::from(side > 8)];
+        let Near { stride, shift, held } = &self.near[usize::from(side > 4) + usize::from(side > 8)];
         let at = ((top >> shift) + 1) * stride + (left >> shift) + 1;
         if side <= 16 && !held.get(at).is_some_and(|near| *near) {
             return false;
