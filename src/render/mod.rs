@@ -6,11 +6,13 @@
 mod camera;
 mod camera_json;
 mod contours;
+mod crossing;
 mod frame;
 mod layers;
 mod looked;
 mod marks;
 mod outline;
+mod place;
 mod project;
 mod pull;
 mod raster;

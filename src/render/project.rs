@@ -3,8 +3,9 @@
 //! Camera coordinates: x right, y up, z towards the camera, eye at the origin. `nearness` is 1 / depth for a pinhole
 //! and -depth for a parallel projection: linear over the image inside a triangle, larger is nearer in both.
 
+use super::place::{Extent, Place, place, rounded};
 use super::simd::vectorised;
-use super::triangle::{Extent, Place, Triangle, place, rounded};
+use super::triangle::Triangle;
 use super::{Camera, Projection};
 use crate::geom::{Affine, Mesh, Solid, Topology};
 use glam::{DMat3, DVec3, Vec3};

@@ -4,9 +4,10 @@
 
 use super::Camera;
 use super::marks::Marks;
+use super::place::{Extent, place, size};
 use super::project::{DepthRange, Lens, Placement, Point, Projected, Vertices, project};
 use super::simd::vectorised;
-use super::triangle::{Extent, Triangle, is_turned, place, size};
+use super::triangle::{Triangle, is_turned};
 use crate::geom::{Mesh, Solid};
 use glam::{DVec3, Vec4};
 

@@ -5,16 +5,14 @@
 //! right of or below it (the top-left rule). Nearness comes from the corners as they were. Small triangles, nearly all of a fine
 //! mesh, are filled eight pixels at a time, others by runs: the same pixels and the same numbers.
 
+use super::crossing::{Crossing, Int};
 use super::marks::Marks;
+use super::place::{BITS, Extent, Place, UNIT, is_near};
 use super::project::Point;
 use glam::{Vec4, Vec4Swizzles};
 use pulp::bytemuck::cast;
-use std::cmp::Ordering;
 use wide::{f32x8, i32x8};
 
-/// Units of a rounded position in a pixel, as a power of two.
-const BITS: u32 = 10;
-const UNIT: i64 = 1 << BITS;
 /// Corners are kept inside this, in units.
 const FARTHEST: i64 = 1 << 60;
 /// The longest side of a small triangle's rectangle, in pixels; its edges fit into 32 bits.
@@ -49,78 +47,6 @@ fn within(q: f32, [lo, hi]: [f32; 2]) -> f32 {
     if q < hi { q } else { hi }
 }
 
-/// A position relative to the centre of the first pixel, rounded to 1/1024 of a pixel: x, y, -x, -y, so that least and greatest
-/// are found in one go. Exact in single precision; what is [`BOUND`] or farther out is kept there.
-pub(super) type Place = Vec4;
-
-/// Beyond any image, in pixels.
-const BOUND: f32 = 16384.0;
-
-/// A coordinate in pixels, relative to the centre of the first one, rounded.
-#[inline(always)]
-pub(super) fn rounded(v: f64) -> f32 {
-    // Added and taken away, it leaves the nearest whole number.
-    const WHOLE: f64 = 6_755_399_441_055_744.0;
-    let (v, bound) = (v - 0.5, f64::from(BOUND));
-    let v = if v > -bound { v } else { -bound };
-    let v = if v < bound { v } else { bound };
-    (((v * UNIT as f64 + WHOLE) - WHOLE) / UNIT as f64) as f32
-}
-
-/// The place of a position in pixels.
-#[inline(always)]
-pub(super) fn place(x: f64, y: f64) -> Place {
-    let (x, y) = (rounded(x), rounded(y));
-    Vec4::new(x, y, -x, -y)
-}
-
-/// The columns and rows of pixels between some places, from the first one to that past the last one: left, top, right, bottom, as
-/// the lowest bits of numbers in single precision, which is how they come about.
-#[derive(Clone, Copy, Debug, Default)]
-pub(super) struct Extent(Vec4);
-
-/// The lowest bits of a sum with this are the nearest whole number, up to 16 of them.
-const LOW_BITS: f32 = 8_388_608.0;
-
-impl Extent {
-    /// The pixels of an image whose centres lie between the places with these least coordinates, as far as columns and rows tell.
-    /// `size` is width and height, twice.
-    #[inline(always)]
-    pub fn between(least: Place, size: Vec4) -> Extent {
-        // Whole numbers in these units are centres: upwards for the first one, downwards and one more for the one past the last.
-        const ALMOST: f32 = (UNIT - 1) as f32 / UNIT as f32;
-        let at = least * Vec4::new(1.0, 1.0, -1.0, -1.0) + Vec4::new(ALMOST, ALMOST, 1.0, 1.0);
-        let at = at.max(Vec4::ZERO).min(size);
-        let nearest = at + LOW_BITS;
-        Extent(nearest - Vec4::select((nearest - LOW_BITS).cmpgt(at), Vec4::ONE, Vec4::ZERO))
-    }
-
-    /// That of a triangle.
-    #[inline(always)]
-    pub fn around([a, b, c]: [Place; 3], size: Vec4) -> Extent {
-        Extent::between(a.min(b).min(c), size)
-    }
-
-    /// Whether there are no pixels.
-    #[inline(always)]
-    pub fn is_empty(&self) -> bool {
-        self.0.cmplt(self.0.zwxy()).bitmask() & 0b11 != 0b11
-    }
-
-    /// Columns and rows.
-    #[inline(always)]
-    pub fn ends(&self) -> [[usize; 2]; 2] {
-        let [left, top, right, bottom] = self.0.to_array().map(|v| usize::from(v.to_bits() as u16));
-        [[left, right], [top, bottom]]
-    }
-}
-
-/// Width and height of an image, twice.
-pub(super) fn size(width: u32, height: u32) -> Vec4 {
-    let (width, height) = (width as f32, height as f32);
-    Vec4::new(width, height, width, height)
-}
-
 /// One triangle, ready to be drawn.
 pub(super) struct Triangle {
     pub points: [Point; 3],
@@ -150,15 +76,9 @@ fn units((place, position): (Place, [f32; 2])) -> [i64; 2] {
         return [x, y].map(|v| (v * UNIT as f32) as i64);
     }
     position.map(|v| {
-        let v = (f64::from(v) - 0.5) * UNIT as f64;
+        let v = (f64::from(v) - 0.5) * f64::from(UNIT);
         ((v + if v < 0.0 { -0.5 } else { 0.5 }) as i64).clamp(-FARTHEST, FARTHEST)
     })
-}
-
-/// Whether a place, or the least coordinates of some, are not kept from being farther out.
-#[inline(always)]
-fn is_near(least: Place) -> bool {
-    least.cmpgt(Vec4::splat(-BOUND)).all()
 }
 
 /// Which way round corners lie in the image: above 0 clockwise, below counter-clockwise, 0 without area.
@@ -229,7 +149,7 @@ impl Triangle {
     /// Edges as functions that are not negative inside: value at a pixel's centre, change by column, change by row.
     #[inline(always)]
     fn edges<N: Int>(&self, corners: [[N; 2]; 3], [x, y]: [N; 2]) -> [[N; 3]; 3] {
-        let (zero, one, unit) = (N::from(0), N::from(1), N::from(UNIT as i32));
+        let (zero, one, unit) = (N::from(0), N::from(1), N::from(UNIT));
         // Counter-clockwise, every edge runs the other way. No branches: they could not be foretold.
         let way = N::from(2 * i32::from(self.clockwise) - 1);
         std::array::from_fn(|i| {
@@ -384,73 +304,9 @@ pub(super) fn bits(mut word: u64) -> impl Iterator<Item = usize> {
     })
 }
 
-/// Whole numbers of some width.
-trait Int:
-    Copy + Ord + From<i32> + std::ops::Add<Output = Self> + std::ops::Sub<Output = Self> + std::ops::Mul<Output = Self>
-{
-    /// The quotient by a positive number, rounded down, and the remainder.
-    fn divided(self, by: Self) -> (Self, Self);
-
-    /// As an index; it is one.
-    fn index(self) -> usize;
-}
-
-macro_rules! int {
-    ($($name:ty),*) => {$(
-        impl Int for $name {
-            fn divided(self, by: Self) -> (Self, Self) {
-                (self.div_euclid(by), self.rem_euclid(by))
-            }
-
-            fn index(self) -> usize {
-                self as usize
-            }
-        }
-    )*};
-}
-
-int!(i32, i64, i128);
-
-/// Where an edge crosses a row, kept by quotient and remainder so that rows need no division.
-struct Crossing<N> {
-    /// Which side is inside: to the right (1), to the left (-1), or one of both whole rows (0).
-    side: i32,
-    /// The edge's function where the row begins, divided by its change from column to column, which is `by`.
-    at: (N, N),
-    per_row: (N, N),
-    by: N,
-}
-
-impl<N: Int> Crossing<N> {
-    fn new([at, by_column, by_row]: [N; 3]) -> Crossing<N> {
-        let zero = N::from(0);
-        let (side, by) = match by_column.cmp(&zero) {
-            Ordering::Greater => (1, by_column),
-            Ordering::Less => (-1, zero - by_column),
-            Ordering::Equal => (0, N::from(1)),
-        };
-        Crossing { side, at: at.divided(by), per_row: by_row.divided(by), by }
-    }
-
-    /// Keeps of a row's columns those inside, and goes on to the next row.
-    fn narrow(&mut self, from: &mut N, to: &mut N) {
-        let (zero, one) = (N::from(0), N::from(1));
-        match self.side {
-            // Inside are columns c with at + c * by >= 0.
-            1 => *from = (*from).max(zero - self.at.0),
-            -1 => *to = (*to).min(self.at.0 + one),
-            _ if self.at.0 < zero => *to = *from,
-            _ => {}
-        }
-        self.at = (self.at.0 + self.per_row.0, self.at.1 + self.per_row.1);
-        if self.at.1 >= self.by {
-            self.at = (self.at.0 + one, self.at.1 - self.by);
-        }
-    }
-}
-
 #[cfg(test)]
 mod tests {
+    use super::super::place::{place, size};
     use super::*;
     use crate::render::Camera;
     use crate::render::testing::Uniform;

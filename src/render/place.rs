@@ -1,0 +1,143 @@
+//! Positions in the image rounded to 1/1024 of a pixel, and the rectangle of pixels between some.
+//!
+//! Invariant: places are exact in single precision, so what is worked out from them does not depend on the order.
+
+use glam::{Vec4, Vec4Swizzles};
+
+/// Units of a rounded position in a pixel, as a power of two.
+pub(super) const BITS: u32 = 10;
+/// Units of a rounded position in a pixel.
+pub(super) const UNIT: i32 = 1 << BITS;
+
+/// A position relative to the centre of the first pixel, rounded to 1/1024 of a pixel: x, y, -x, -y, so that least and greatest
+/// are found in one go. Exact in single precision; what is [`BOUND`] or farther out is kept there.
+pub(super) type Place = Vec4;
+
+/// Beyond any image, in pixels.
+const BOUND: f32 = 16384.0;
+
+/// A coordinate in pixels, relative to the centre of the first one, rounded.
+#[inline(always)]
+pub(super) fn rounded(v: f64) -> f32 {
+    // Added and taken away, it leaves the nearest whole number.
+    const WHOLE: f64 = 6_755_399_441_055_744.0;
+    let (v, bound) = (v - 0.5, f64::from(BOUND));
+    let v = if v > -bound { v } else { -bound };
+    let v = if v < bound { v } else { bound };
+    (((v * f64::from(UNIT) + WHOLE) - WHOLE) / f64::from(UNIT)) as f32
+}
+
+/// The place of a position in pixels.
+#[inline(always)]
+pub(super) fn place(x: f64, y: f64) -> Place {
+    let (x, y) = (rounded(x), rounded(y));
+    Vec4::new(x, y, -x, -y)
+}
+
+/// The columns and rows of pixels between some places, from the first one to that past the last one: left, top, right, bottom, as
+/// the lowest bits of numbers in single precision, which is how they come about.
+#[derive(Clone, Copy, Debug, Default)]
+pub(super) struct Extent(Vec4);
+
+/// The lowest bits of a sum with this are the nearest whole number, up to 16 of them.
+const LOW_BITS: f32 = 8_388_608.0;
+
+impl Extent {
+    /// The pixels of an image whose centres lie between the places with these least coordinates, as far as columns and rows tell.
+    /// `size` is width and height, twice.
+    #[inline(always)]
+    pub fn between(least: Place, size: Vec4) -> Extent {
+        // Whole numbers in these units are centres: upwards for the first one, downwards and one more for the one past the last.
+        const ALMOST: f32 = (UNIT - 1) as f32 / UNIT as f32;
+        let at = least * Vec4::new(1.0, 1.0, -1.0, -1.0) + Vec4::new(ALMOST, ALMOST, 1.0, 1.0);
+        let at = at.max(Vec4::ZERO).min(size);
+        let nearest = at + LOW_BITS;
+        Extent(nearest - Vec4::select((nearest - LOW_BITS).cmpgt(at), Vec4::ONE, Vec4::ZERO))
+    }
+
+    /// That of a triangle.
+    #[inline(always)]
+    pub fn around([a, b, c]: [Place; 3], size: Vec4) -> Extent {
+        Extent::between(a.min(b).min(c), size)
+    }
+
+    /// Whether there are no pixels.
+    #[inline(always)]
+    pub fn is_empty(&self) -> bool {
+        self.0.cmplt(self.0.zwxy()).bitmask() & 0b11 != 0b11
+    }
+
+    /// Columns and rows.
+    #[inline(always)]
+    pub fn ends(&self) -> [[usize; 2]; 2] {
+        let [left, top, right, bottom] = self.0.to_array().map(|v| usize::from(v.to_bits() as u16));
+        [[left, right], [top, bottom]]
+    }
+}
+
+/// Width and height of an image, twice.
+pub(super) fn size(width: u32, height: u32) -> Vec4 {
+    let (width, height) = (width as f32, height as f32);
+    Vec4::new(width, height, width, height)
+}
+
+/// Whether a place, or the least coordinates of some, are not kept from being farther out.
+#[inline(always)]
+pub(super) fn is_near(least: Place) -> bool {
+    least.cmpgt(Vec4::splat(-BOUND)).all()
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+    use crate::render::testing::Uniform;
+
+    /// First and past-the-last pixel whose centres lie between two rounded coordinates, in double precision.
+    fn between(least: f64, most: f64, side: u32) -> [usize; 2] {
+        let inside = |v: f64| v.clamp(0.0, f64::from(side)) as usize;
+        [inside(least.ceil()), inside(most.floor() + 1.0)]
+    }
+
+    #[test]
+    fn extents_are_those_of_double_precision() {
+        let mut random = Uniform(51);
+        let (mut some, mut none) = (0, 0);
+        for round in 0..20_000 {
+            let side = [7, 128, 5000, 16384][round % 4];
+            let reach = f64::from(side) * [0.6, 1.5, 30.0][round % 3];
+            let near = [random.between(-0.1, 1.1), random.between(-0.1, 1.1)].map(|v| v * f64::from(side));
+            let corners: [[f64; 2]; 3] = std::array::from_fn(|_| {
+                let spread = if round % 5 == 0 { reach } else { [0.3, 3.0, 40.0][round % 3] };
+                let v = near.map(|v| v + random.between(-spread, spread));
+                // Often exactly on centres.
+                if round % 7 == 0 { v.map(|v| (v * 2.0).round() / 2.0) } else { v }
+            });
+            let (width, height) = (side, side / 2 + 1);
+            let extent = Extent::around(corners.map(|[x, y]| place(x, y)), size(width, height));
+            let ends: [[usize; 2]; 2] = std::array::from_fn(|axis| {
+                let all = corners.map(|c| f64::from(rounded(c[axis])));
+                let (least, most) = (all[0].min(all[1]).min(all[2]), all[0].max(all[1]).max(all[2]));
+                between(least, most, [width, height][axis])
+            });
+            let empty = ends.iter().any(|[first, past]| first >= past);
+            assert_eq!(extent.is_empty(), empty, "{corners:?} in {width} x {height}");
+            if !empty {
+                assert_eq!(extent.ends(), ends, "{corners:?} in {width} x {height}");
+            }
+            (some, none) = (some + usize::from(!empty), none + usize::from(empty));
+        }
+        assert!(some > 5000 && none > 1000, "{some} {none}");
+    }
+
+    #[test]
+    fn places_are_the_nearest_and_stay_in_bounds() {
+        for (at, wanted) in [(0.5, 0.0), (1.0, 0.5), (3.25 + 0.4 / 1024.0, 2.75), (-7.5, -8.0)] {
+            assert_eq!(rounded(at), wanted);
+        }
+        for far in [1e9, 1e300, f64::INFINITY] {
+            assert_eq!([rounded(far), rounded(-far)], [BOUND, -BOUND]);
+            assert!(!is_near(place(far, 0.0)) && !is_near(place(0.0, -far)));
+        }
+        assert!(rounded(f64::NAN).abs() <= BOUND && is_near(place(-16000.0, 16000.0)));
+    }
+}
