@@ -203,6 +203,7 @@ mod tests {
         assert!(m.topology.edges.iter().all(|e| e.faces[1] == NO_FACE));
         assert!(m.normals.iter().all(|n| (*n - Vec3::Z).length() < 1e-6));
     }
+
     #[test]
     fn lines_of_edges_hang_together() {
         // Two loops of four boundary edges, told in an order that joins them late, a crease apart, and one smooth edge.

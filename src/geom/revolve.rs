@@ -7,7 +7,7 @@
 
 use super::edges::pair_edges;
 use super::real::Real;
-use super::{Edge, Mesh, NO_FACE, Topology};
+use super::{Edge, Mesh, Topology};
 use glam::{DVec3, Vec3};
 use std::cell::RefCell;
 use std::sync::Arc;
@@ -41,7 +41,7 @@ pub(super) fn revolve(strips: &[Strip], sides: u32, closed: bool, part_count: u1
     let signature = signature(strips, sides, closed, part_count, rising);
     let Shared { topology, circle } = cached(signature, || {
         let mut topology = topology(strips, sides, closed, part_count);
-        topology.encloses = rising && topology.edges.iter().all(|e| e.faces[1] != NO_FACE);
+        topology.encloses = rising && !topology.edges.open();
         Shared { topology: Arc::new(topology), circle: circle(sides) }
     });
     let n = sides as usize;

@@ -71,9 +71,7 @@ impl Contours {
                 if pixels().next().is_none() {
                     break;
                 }
-                if side > 0 {
-                    looked.clear(camera);
-                }
+                looked.clear(camera);
                 pixels().for_each(|pixel| looked.mark(pixel));
                 let depth = looked.draw(solid, camera, projected);
                 let Some(depths) = Depths::new(depth, camera.width, camera.height, range.extent()) else { break };

@@ -22,9 +22,8 @@ pub(super) struct Looked {
 }
 
 impl Looked {
-    /// Makes ready for a solid in a camera's image, without marks.
+    /// Finds what there is to be drawn of a solid in a camera's image.
     pub fn begin(&mut self, solid: &Solid, camera: &Camera, projected: &Projected) {
-        self.clear(camera);
         let meshes = solid.instances();
         if self.candidates.len() < meshes.len() {
             self.candidates.resize_with(meshes.len(), Candidates::default);

@@ -54,10 +54,7 @@ fn mesh_triangles(
     let (size, back) = (size(camera.width, camera.height), back(mesh, placement, vertices));
     for (face, corners) in mesh.topology.triangles.iter().enumerate() {
         let Some(places) = vertices.places(corners) else { continue };
-        let extent = Extent::around(places, size);
-        if !extent.is_empty()
-            && let Some(triangle) = Triangle::new(corners.map(|v| vertices.point(v)), places, extent, back)
-        {
+        if let Some(triangle) = Triangle::within(corners.map(|v| vertices.point(v)), places, size, back) {
             draw(&triangle, face, WHOLE);
         }
     }
@@ -97,11 +94,7 @@ fn cut_triangles(
             let weights = [cut[0], cut[m - 1], cut[m]];
             let points = weights.each_ref().map(corner);
             let places = points.map(|p| place(p.x, p.y));
-            let points = points.map(Point::single);
-            let extent = Extent::around(places, size);
-            if !extent.is_empty()
-                && let Some(triangle) = Triangle::new(points, places, extent, 0.0)
-            {
+            if let Some(triangle) = Triangle::within(points.map(Point::single), places, size, 0.0) {
                 draw(&triangle, face, weights);
             }
         }

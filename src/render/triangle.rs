@@ -54,8 +54,7 @@ pub(super) struct Triangle {
     pub area: f64,
     /// Least and greatest nearness of the corners.
     limits: [f32; 2],
-    /// The corners' places, and positions in single precision.
-    corners: [(Place, [f32; 2]); 3],
+    places: [Place; 3],
     /// Whether they lie clockwise as seen in the image.
     clockwise: bool,
     columns: [usize; 2],
@@ -70,44 +69,48 @@ fn centre(pixel: usize) -> i32 {
 }
 
 /// A corner in units, also where its place cannot hold it.
-fn units((place, position): (Place, [f32; 2])) -> [i64; 2] {
+fn units(place: Place, point: &Point) -> [i64; 2] {
     let [x, y, ..] = place.to_array();
     if is_near(place) {
         return [x, y].map(|v| (v * UNIT as f32) as i64);
     }
-    position.map(|v| {
-        let v = (f64::from(v) - 0.5) * f64::from(UNIT);
+    // In single precision, which is all that is kept of most points.
+    [point.x, point.y].map(|v| {
+        let v = (f64::from(v as f32) - 0.5) * f64::from(UNIT);
         ((v + if v < 0.0 { -0.5 } else { 0.5 }) as i64).clamp(-FARTHEST, FARTHEST)
     })
 }
 
-/// Which way round corners lie in the image: above 0 clockwise, below counter-clockwise, 0 without area.
+/// Which way round near places lie in the image: above 0 clockwise, below counter-clockwise, 0 without area.
 #[inline(always)]
-fn turn(corners: &[(Place, [f32; 2]); 3], near: bool) -> f64 {
-    if !near {
-        return far_turn(corners);
-    }
+fn turn([a, b, c]: [Place; 3]) -> f64 {
     // Differences of places are exact in single precision, their products in double precision.
-    let [a, b, c] = corners.map(|(place, _)| place);
     let (b, c) = ((b - a).to_array().map(f64::from), (c - a).to_array().map(f64::from));
     b[0] * c[1] - b[1] * c[0]
+}
+
+/// The same for places of which some are not near.
+#[inline(never)]
+fn far_turn(places: &[Place; 3], points: &[Point; 3]) -> f64 {
+    let [a, b, c] = std::array::from_fn(|i| units(places[i], &points[i]).map(i128::from));
+    ((b[0] - a[0]) * (c[1] - a[1]) - (b[1] - a[1]) * (c[0] - a[0])).signum() as f64
 }
 
 /// Whether corners are known to turn that way, as [`Triangle::new`] has it.
 #[inline(always)]
 pub(super) fn is_turned(places: [Place; 3], back: f64) -> bool {
     let [a, b, c] = places;
-    let corners = places.map(|place| (place, [0.0; 2]));
-    is_near(a.min(b).min(c)) & (turn(&corners, true) * back > 0.0)
-}
-
-#[inline(never)]
-fn far_turn(corners: &[(Place, [f32; 2]); 3]) -> f64 {
-    let [a, b, c] = corners.map(|corner| units(corner).map(i128::from));
-    ((b[0] - a[0]) * (c[1] - a[1]) - (b[1] - a[1]) * (c[0] - a[0])).signum() as f64
+    is_near(a.min(b).min(c)) & (turn(places) * back > 0.0)
 }
 
 impl Triangle {
+    /// As [`Triangle::new`], in an image of some [`size`](super::place::size).
+    #[inline(always)]
+    pub fn within(points: [Point; 3], places: [Place; 3], size: Vec4, back: f64) -> Option<Triangle> {
+        let extent = Extent::around(places, size);
+        if extent.is_empty() { None } else { Triangle::new(points, places, extent, back) }
+    }
+
     /// `None` when it covers nothing. With `back`, also when it turns that way: clockwise in the image if above 0, the other way if
     /// below.
     #[inline(always)]
@@ -117,8 +120,7 @@ impl Triangle {
         // Greatest coordinates less the least ones.
         let wide = -(least + least.zwxy());
         let small = wide.x < SMALL as f32 && wide.y < SMALL as f32;
-        let [a, b, c] = std::array::from_fn(|i| (places[i], [points[i].x as f32, points[i].y as f32]));
-        let turn = turn(&[a, b, c], is_near(least));
+        let turn = if is_near(least) { turn(places) } else { far_turn(&places, &points) };
         if turn == 0.0 || turn * back > 0.0 {
             return None;
         }
@@ -131,7 +133,7 @@ impl Triangle {
         let (lo, hi) = (if p < q { p } else { q }, if p > q { p } else { q });
         let limits = [if lo < r { lo } else { r }, if hi > r { hi } else { r }];
         let [columns, rows] = extent.ends();
-        Some(Triangle { points, limits, area, corners: [a, b, c], clockwise: turn > 0.0, columns, rows, small })
+        Some(Triangle { points, limits, area, places, clockwise: turn > 0.0, columns, rows, small })
     }
 
     /// Nearness at the first column by row, and its change from column to column.
@@ -168,7 +170,7 @@ impl Triangle {
         // The lowest bits of a sum with this are the nearest whole number, also below zero.
         const LOW_BITS: f32 = 12_582_912.0;
         let start = Vec4::new(column as i32 as f32, self.rows[0] as i32 as f32, 0.0, 0.0);
-        let corners = self.corners.map(|(place, _)| {
+        let corners = self.places.map(|place| {
             let [x, y, ..] = ((place - start) * UNIT as f32 + LOW_BITS).to_array().map(|v| v.to_bits() as i32);
             [x - LOW_BITS.to_bits() as i32, y - LOW_BITS.to_bits() as i32]
         });
@@ -178,7 +180,7 @@ impl Triangle {
     /// Calls `draw` for every row's run of pixels.
     pub fn runs(&self, draw: impl FnMut(&Run)) {
         // Products of two differences must fit.
-        let corners = self.corners.map(units);
+        let corners: [[i64; 2]; 3] = std::array::from_fn(|i| units(self.places[i], &self.points[i]));
         let near = corners.as_flattened().iter().all(|v| v.abs() < 1 << 29);
         if near { self.runs_in(corners, draw) } else { self.runs_in(corners.map(|p| p.map(i128::from)), draw) }
     }
@@ -317,8 +319,7 @@ mod tests {
 
     fn triangle(points: [Point; 3], width: u32, height: u32) -> Option<Triangle> {
         let places = points.map(|p| place(p.x, p.y));
-        let extent = Extent::around(places, size(width, height));
-        if extent.is_empty() { None } else { Triangle::new(points, places, extent, 0.0) }
+        Triangle::within(points, places, size(width, height), 0.0)
     }
 
     fn cover(triangles: &[[Point; 3]], side: u32) -> Vec<u32> {

@@ -55,7 +55,7 @@ pub fn by_skeleton(mesh: &Mesh, most: usize) -> Result<Armature, GeomError> {
     if !(1..=MOST_BONES).contains(&most) {
         return Err(GeomError::invalid(format!("a skeleton has 1 to {MOST_BONES} bones, not {most}")));
     }
-    let open = mesh.topology.edges.iter().filter(|e| e.faces[1] == crate::geom::NO_FACE).count();
+    let open = mesh.topology.edges.iter().filter(|e| e.is_boundary()).count();
     if open > 0 {
         return Err(GeomError::invalid(format!("a skeleton needs a closed mesh; this one has {open} open edges")));
     }
