@@ -2,9 +2,10 @@
 
 use super::{BankError, command};
 use crate::Model;
+use crate::infer::in_parallel;
 use crate::lang::builtins::scene::{ImageValue, KeypointsValue, ViewValue};
 use crate::lang::value::Value;
-use crate::render::{Contours, View};
+use crate::render::{BatchRenderer, ContourSlice, Contours, Scene, View};
 use crate::report::pictures::{Drawn, shaded};
 use crate::vision::Elements;
 use crate::vision::features::{self, Query};
@@ -62,7 +63,29 @@ impl Features {
         }
     }
 
-    /// The same, knowing the landmarks of a scene.
+    /// The features of many scenes' pictures in turn; their contours are drawn together.
+    ///
+    /// # Errors
+    /// As [`Features::of`].
+    pub(super) fn of_all(
+        &self,
+        views: Vec<Arc<View>>,
+        threads: usize,
+        renderer: &dyn BatchRenderer,
+    ) -> Vec<Result<Vec<f32>, BankError>> {
+        let Features::Contours { size } = self else {
+            return in_parallel(threads, views, |view| self.of(&view));
+        };
+        let scenes: Vec<Scene> = views.iter().map(|view| view.scene(*size)).collect();
+        let batch = renderer.contours(&scenes);
+        in_parallel(threads, (0..batch.len()).collect(), |i| {
+            let ContourSlice { x, y, tx, ty, length, width, height } = batch.scene(i);
+            let elements = Elements { x, y, tx, ty, length, width, height };
+            Ok(features::contour_features(&features::rendered(&elements)))
+        })
+    }
+
+    /// These features, knowing the landmarks of a scene.
     pub(super) fn named(self, view: &View) -> Features {
         match self {
             Features::Keypoints { .. } => {

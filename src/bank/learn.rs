@@ -6,6 +6,7 @@ use crate::Model;
 use crate::infer::{attempts, in_parallel};
 use crate::lang::code::Operand;
 use crate::lang::value::Value;
+use crate::render::{Cores, View};
 use crate::rng::{Purpose, StreamKey};
 use crate::trace::{Draws, Limits, Trace};
 use std::path::Path;
@@ -42,19 +43,27 @@ pub fn learn(model: &Model, how: &Learn, path: &Path, done: &AtomicU64) -> Resul
     let operand = picture(&mut prior.clone(), draws(how.seed, 0, 0)).ok_or_else(|| {
         BankError::Observed("the program has no picture: no top-level name is a view or a solid".into())
     })?;
-    let mut features = how.features.clone();
-    let first = one(&prior, operand, how, 0, |view| features = features.clone().named(view))?;
-    let mut writer = BankWriter::create(path, how.count, first.features.len())?;
+    let (_, first) = one(&prior, operand, how, 0)?;
+    let features = how.features.clone().named(&first);
+    let mut writer = BankWriter::create(path, how.count, how.features.of(&first)?.len())?;
+    let renderer = Cores::new(how.threads);
     let mut from = 0;
     while from < how.count {
         let to = (from + BLOCK).min(how.count);
         let draw = |i: u64| {
-            let entry = one(&prior, operand, how, i, |_| ());
+            let scene = one(&prior, operand, how, i);
             done.fetch_add(1, Ordering::Relaxed);
-            entry
+            scene
         };
-        let entries: Result<Vec<Entry>, BankError> =
+        let scenes: Result<Vec<_>, BankError> =
             in_parallel(how.threads, (from..to).collect(), draw).into_iter().collect();
+        let (latents, views): (Vec<_>, Vec<_>) = scenes?.into_iter().unzip();
+        let found = how.features.of_all(views, how.threads, &renderer);
+        let entries: Result<Vec<Entry>, BankError> = latents
+            .into_iter()
+            .zip(found)
+            .map(|(latents, features)| Ok(Entry { latents, features: features? }))
+            .collect();
         writer.add(&entries?)?;
         from = to;
     }
@@ -65,22 +74,15 @@ fn draws(seed: u64, i: u64, attempt: u64) -> Draws {
     Draws { key: StreamKey::new(seed, u32::MAX, Purpose::START), step: i, lane: attempt }
 }
 
-/// Entry `i`.
-fn one(
-    prior: &Trace,
-    operand: Operand,
-    how: &Learn,
-    i: u64,
-    seen: impl FnOnce(&crate::render::View),
-) -> Result<Entry, BankError> {
+/// The latents of entry `i`, and its scene.
+fn one(prior: &Trace, operand: Operand, how: &Learn, i: u64) -> Result<(Vec<Named>, Arc<View>), BankError> {
     let (latents, value) =
         attempts(RETRIES, |attempt| prior.clone().imagine(&[operand], draws(how.seed, i, attempt), drawn))
             .map_err(BankError::Run)?;
     let view = value.as_ref().and_then(|v| as_view(v, None)).ok_or_else(|| {
         BankError::Observed(format!("entry {i}: the picture is neither a view nor a solid in this scene"))
     })?;
-    seen(&view);
-    Ok(Entry { latents, features: how.features.of(&view)? })
+    Ok((latents, view))
 }
 
 /// The choices of a trace by address hash, and the value it was asked for.

@@ -59,7 +59,7 @@ pub(super) fn build(positions: &[Vec3], triangles: &[[u32; 3]], parts: &[u16]) -
         .collect();
     let part_count = kept_parts.iter().max().map_or(0, |p| p.saturating_add(1));
     let part_names = Vec::new();
-    let topology = Topology { triangles: out, parts: kept_parts, part_count, part_names, edges, encloses: false };
+    let topology = Topology { triangles: out, parts: kept_parts, part_count, part_names, edges, ..Topology::default() };
     Some(Mesh { positions: out_positions, normals: out_normals, topology: Arc::new(topology) })
 }
 

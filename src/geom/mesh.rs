@@ -4,7 +4,7 @@
 //! both sides across such splits. Meshes of one shape share their [`Topology`].
 
 use super::edges;
-use super::{Bounds, GeomError};
+use super::{Bounds, GeomError, Patches};
 use glam::Vec3;
 use rustc_hash::FxHashMap;
 use std::sync::Arc;
@@ -118,6 +118,8 @@ pub struct Topology {
     /// Whether the faces are known to enclose a body without crossing each other: seen from outside, those that are turned
     /// away are hidden by others and need not be drawn. Meshes from files make no such promise.
     pub encloses: bool,
+    /// The triangles by small groups.
+    pub patches: Patches,
 }
 
 /// A triangle mesh.

@@ -15,6 +15,7 @@ mod landmark;
 mod lathe;
 mod mesh;
 pub mod obj;
+mod patches;
 mod profile_path;
 mod real;
 mod revolve;
@@ -29,6 +30,7 @@ pub use frame::{FileFrame, UpAxis};
 pub use landmark::Landmark;
 pub use lathe::{Caps, LatheGradient, Profile, lathe, pull_lathe};
 pub use mesh::{Edge, Edges, Mesh, NO_FACE, Topology};
+pub use patches::Patches;
 pub use solid::{Instance, PlacedGradient, Solid};
 pub use sphere::{pull_sphere, sphere};
 

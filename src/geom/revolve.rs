@@ -209,5 +209,5 @@ fn topology(strips: &[Strip], sides: u32, closed: bool, part_count: u16) -> Topo
             crease,
         })
         .collect();
-    Topology { triangles, parts, part_count, part_names: Vec::new(), edges, encloses: false }
+    Topology { triangles, parts, part_count, edges, ..Topology::default() }
 }

@@ -5,8 +5,8 @@
 //! Invariant: the five lists have one entry per piece, all finite, positions inside the image, tangents of unit length.
 
 use super::looked::Looked;
-use super::project::{DepthRange, Fronts, Placement, Projected, project};
-use super::trace::trace_mesh;
+use super::project::{DepthRange, Placement, Projected, project};
+use super::trace::{Room, trace_mesh};
 use super::visibility::{Depths, Piece};
 use super::{Camera, layers};
 use crate::geom::Solid;
@@ -36,7 +36,7 @@ pub struct Contours {
 #[derive(Default)]
 struct Scratch {
     projected: Projected,
-    fronts: Fronts,
+    room: Room,
     looked: Looked,
     /// Pieces, hidden or not.
     pieces: Vec<Piece>,
@@ -61,7 +61,6 @@ impl Contours {
         with_scratch(|scratch| {
             let range = scratch.trace(solid, camera);
             let Scratch { projected, looked, pieces, hidden, found, .. } = scratch;
-            looked.begin(solid, camera, projected);
             hidden.clear();
             hidden.resize(pieces.len(), true);
             // Most pieces are seen by their first look: only the others take a second one.
@@ -141,7 +140,7 @@ impl Scratch {
         for (i, instance) in solid.instances().iter().enumerate() {
             let (placement, vertices) = (Placement::new(camera, &instance.affine), self.projected.mesh(i));
             let pieces = &mut self.pieces;
-            trace_mesh(&instance.mesh, &placement, camera, &vertices, &mut self.fronts, |piece, _| pieces.push(piece));
+            trace_mesh(&instance.mesh, &placement, camera, &vertices, &mut self.room, |piece, _| pieces.push(piece));
         }
         range
     }

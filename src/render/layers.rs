@@ -7,10 +7,10 @@
 
 use super::contours::Contours;
 use super::frame::to_depth;
-use super::project::{DepthRange, Fronts, Lens, Placement, Projected};
+use super::project::{DepthRange, Lens, Placement, Projected};
 use super::raster::{Area, Candidates, draw_mesh};
 use super::simd::vectorised;
-use super::trace::trace_mesh;
+use super::trace::{Room, trace_mesh};
 use super::visibility::{Depths, Piece};
 use super::{Camera, Projection};
 use crate::geom::{Affine, Instance, Mesh, Solid};
@@ -68,7 +68,7 @@ struct Layers {
     drawn: Area,
     projected: Projected,
     candidates: Candidates,
-    fronts: Fronts,
+    room: Room,
     /// Number of pieces seen the last time.
     found: usize,
 }
@@ -164,7 +164,7 @@ impl Layers {
         let slot = &mut self.slots[at];
         self.bytes -= slot.layer.bytes();
         (slot.mesh, slot.affine, slot.camera) = (Arc::downgrade(&instance.mesh), affine, eye);
-        slot.layer.draw(instance, camera, (&mut self.projected, &mut self.candidates), &mut self.fronts);
+        slot.layer.draw(instance, camera, (&mut self.projected, &mut self.candidates), &mut self.room);
         self.bytes += slot.layer.bytes();
         at
     }
@@ -186,7 +186,7 @@ impl Layer {
         instance: &Instance,
         camera: &Camera,
         (projected, candidates): (&mut Projected, &mut Candidates),
-        fronts: &mut Fronts,
+        room: &mut Room,
     ) {
         let placement = Placement::new(camera, &instance.affine);
         projected.clear();
@@ -196,7 +196,7 @@ impl Layer {
         draw_mesh(&instance.mesh, &placement, camera, &vertices, candidates, &self.area, &mut self.depth);
         to_depth(camera, &mut self.depth);
         self.pieces.clear();
-        trace_mesh(&instance.mesh, &placement, camera, &vertices, fronts, |piece, _| self.pieces.push(piece));
+        trace_mesh(&instance.mesh, &placement, camera, &vertices, room, |piece, _| self.pieces.push(piece));
     }
 
     /// Puts what is nearer than the picture into it.

@@ -17,22 +17,10 @@ pub(super) struct Looked {
     /// Nearness, then depth; of no meaning where there is no mark.
     depth: Vec<f32>,
     empty: f32,
-    /// The candidates of each mesh.
-    candidates: Vec<Candidates>,
+    candidates: Candidates,
 }
 
 impl Looked {
-    /// Finds what there is to be drawn of a solid in a camera's image.
-    pub fn begin(&mut self, solid: &Solid, camera: &Camera, projected: &Projected) {
-        let meshes = solid.instances();
-        if self.candidates.len() < meshes.len() {
-            self.candidates.resize_with(meshes.len(), Candidates::default);
-        }
-        for (i, (item, candidates)) in meshes.iter().zip(&mut self.candidates).enumerate() {
-            candidates.find(&item.mesh, &Placement::new(camera, &item.affine), camera, &projected.mesh(i));
-        }
-    }
-
     /// Removes all marks.
     pub fn clear(&mut self, camera: &Camera) {
         self.marks.clear(camera);
@@ -54,8 +42,9 @@ impl Looked {
     /// Draws the solid at the marked pixels, and says what depth they have: entries of an image of which the others mean nothing.
     pub fn draw(&mut self, solid: &Solid, camera: &Camera, projected: &Projected) -> &[f32] {
         let Looked { marks, depth, candidates, .. } = self;
+        marks.settle();
         let depth = &mut depth[..camera.pixels()];
-        for (i, (item, candidates)) in solid.instances().iter().zip(candidates).enumerate() {
+        for (i, item) in solid.instances().iter().enumerate() {
             let (placement, vertices) = (Placement::new(camera, &item.affine), projected.mesh(i));
             fill_some(&item.mesh, &placement, camera, &vertices, candidates, marks, depth);
         }

@@ -1,69 +1,88 @@
 //! Marked pixels of an image, so kept that a rectangle without marks is quickly told.
 
 use super::Camera;
+use super::simd::vectorised;
 
 /// Marks at pixels. Reused from image to image.
 #[derive(Default)]
 pub(super) struct Marks {
     /// A bit for each pixel, row by row, and one word more.
     words: Vec<u64>,
-    /// The same by blocks of eight rows of eight pixels, and a block more to the right and below.
-    blocks: Vec<u64>,
-    /// Blocks in a row.
+    /// For each pixel the side of the smallest square that holds a mark and has the pixel in its upper left corner, [`FAR`] if that
+    /// is larger than [`SIDE`]. There are columns more at the right and a row below.
+    reach: Vec<u8>,
+    /// Entries of `reach` in a row.
     stride: usize,
-    /// By squares of 4, 8 and 16 pixels a side.
-    near: [Near; 3],
     width: u32,
 }
 
-/// Whether there is a mark in a square of pixels or in those to the right, below, or both; there is a row of squares above the
-/// image and a column before it.
-#[derive(Default)]
-struct Near {
-    held: Vec<bool>,
-    /// Squares in a row.
-    stride: usize,
-    /// Their side, as a power of two.
-    shift: u32,
+/// The largest side of a square that is told by one look.
+const SIDE: usize = 16;
+/// Pixels worked on at a time: long enough for loops over them to be told from code that is written out.
+const WIDE: usize = 64;
+/// More than that.
+const FAR: u8 = SIDE as u8 + 1;
+
+/// Some entries of a row.
+#[inline(always)]
+fn chunk(row: &[u8], at: usize) -> [u8; WIDE] {
+    row.get(at..).and_then(|row| row.first_chunk()).copied().unwrap_or([FAR; WIDE])
 }
 
-/// As many bytes as pixels in a block's row, each 1.
-const EACH_ROW: u64 = 0x0101_0101_0101_0101;
+/// Makes entries of a row at most others and a step more.
+#[inline(always)]
+fn nearer(row: &mut [u8], at: usize, other: [u8; WIDE], step: u8) {
+    let Some(own) = row.get_mut(at..).and_then(|row| row.first_chunk_mut::<WIDE>()) else { return };
+    for i in 0..WIDE {
+        own[i] = own[i].min(other[i] + step);
+    }
+}
 
 impl Marks {
     /// Removes all marks, for a camera's image.
     pub fn clear(&mut self, camera: &Camera) {
         self.width = camera.width;
-        self.stride = camera.width as usize / 8 + 2;
+        self.stride = (camera.width as usize).next_multiple_of(WIDE) + WIDE;
         self.words.clear();
         self.words.resize(camera.pixels() / 64 + 2, 0);
-        self.blocks.clear();
-        self.blocks.resize(self.stride * (camera.height as usize / 8 + 2), 0);
-        for (near, shift) in self.near.iter_mut().zip([2, 3, 4]) {
-            let [columns, rows] = [camera.width, camera.height].map(|side| (side >> shift) as usize + 2);
-            (near.stride, near.shift) = (columns, shift);
-            near.held.clear();
-            near.held.resize(columns * rows, false);
-        }
+        self.reach.clear();
+        self.reach.resize(self.stride * (camera.height as usize + 1), FAR);
     }
 
     /// Marks a pixel of the image.
     #[inline]
     pub fn set(&mut self, pixel: u32) {
-        let (x, y) = (pixel % self.width, pixel / self.width);
-        let block = (y / 8) as usize * self.stride + (x / 8) as usize;
-        if let (Some(word), Some(block)) = (self.words.get_mut(pixel as usize / 64), self.blocks.get_mut(block)) {
+        let at = (pixel / self.width) as usize * self.stride + (pixel % self.width) as usize;
+        if let (Some(word), Some(reach)) = (self.words.get_mut(pixel as usize / 64), self.reach.get_mut(at)) {
             *word |= 1 << (pixel % 64);
-            *block |= 1 << (8 * (y % 8) + x % 8);
+            *reach = 1;
         }
-        for Near { held, stride, shift } in &mut self.near {
-            let at = ((y >> *shift) as usize + 1) * *stride + (x >> *shift) as usize + 1;
-            for at in [at, at - 1, at - *stride, at - *stride - 1] {
-                if let Some(held) = held.get_mut(at) {
-                    *held = true;
+    }
+
+    /// To be called when all marks are set, before rectangles are asked for.
+    pub fn settle(&mut self) {
+        let Marks { reach, stride, .. } = self;
+        vectorised(
+            #[inline(always)]
+            || {
+                let mut rows = reach.chunks_exact_mut(*stride).rev();
+                let Some(mut below) = rows.next() else { return };
+                for own in rows {
+                    // A square is one pixel and, a side shorter, those to the right, below, and both.
+                    for at in (0..own.len() - WIDE).step_by(WIDE) {
+                        nearer(own, at, chunk(below, at), 1);
+                        nearer(own, at, chunk(below, at + 1), 1);
+                    }
+                    for step in [1, 2, 4, 8] {
+                        // What lies to the right is not written yet.
+                        for at in (0..own.len() - WIDE).step_by(WIDE) {
+                            nearer(own, at, chunk(own, at + step), step as u8);
+                        }
+                    }
+                    below = own;
                 }
-            }
-        }
+            },
+        );
     }
 
     /// All marks, 64 pixels at a time.
@@ -80,39 +99,38 @@ impl Marks {
         if count < 64 { word & ((1 << count) - 1) } else { word }
     }
 
-    /// Whether there is a mark in some columns and rows.
+    /// Whether there may be a mark in some columns and rows, of which there may be none: false where the square around them that begins with them has none.
     #[inline(always)]
-    pub fn hold(&self, [left, right]: [usize; 2], [top, bottom]: [usize; 2]) -> bool {
-        let (columns, rows) = (right - left, bottom - top);
-        // Quickly told for most: what is not longer than a square lies in four of them.
-        let side = columns.max(rows);
-        let Near { stride, shift, held } = &self.near[usize::from(side > 4) + usize::from(side > 8)];
-        let at = ((top >> shift) + 1) * stride + (left >> shift) + 1;
-        if side <= 16 && !held.get(at).is_some_and(|near| *near) {
-            return false;
-        }
-        if side > 8 {
-            return self.hold_many([left, right], [top, bottom]);
-        }
-        // At most two blocks each way.
-        let at = top / 8 * self.stride + left / 8;
-        let pair =
-            |at: usize| self.blocks.get(at..).and_then(|b| b.first_chunk::<2>()).copied().unwrap_or([u64::MAX; 2]);
-        let ([a, b], [c, d]) = (pair(at), pair(at + self.stride));
-        let across = ((1u64 << columns) - 1) << (left % 8);
-        let [first, second] = [across & 0xff, across >> 8].map(|row| row * EACH_ROW);
-        let above = rows.min(8 - top % 8);
-        let upper = (u64::MAX >> (64 - 8 * above)) << (8 * (top % 8));
-        // Two shifts, since one of 64 is none.
-        let lower = (u64::MAX >> 1) >> (63 - 8 * (rows - above));
-        (((a & first) | (b & second)) & upper) | (((c & first) | (d & second)) & lower) != 0
+    pub fn may_hold(&self, [[left, right], [top, bottom]]: [[usize; 2]; 2]) -> bool {
+        let side = right.wrapping_sub(left).max(bottom.wrapping_sub(top));
+        let reach = self.reach.get(top * self.stride + left).copied().unwrap_or_default();
+        (usize::from(reach) <= side) | (side > SIDE)
     }
 
+    /// Whether there is a mark in some columns and rows, of which there are some.
+    #[inline(always)]
+    pub fn hold(&self, [[left, right], [top, bottom]]: [[usize; 2]; 2]) -> bool {
+        let (columns, rows) = (right - left, bottom - top);
+        // Three squares in a line, at both ends and in the middle, cover what is at most three times as long as wide.
+        let side = columns.min(rows);
+        let (across, down) = (columns - side, rows - side);
+        if side > SIDE || across + down > 2 * side {
+            return self.hold_long([left, right], [top, bottom], side.min(SIDE));
+        }
+        let at = top * self.stride + left;
+        let near = |at: usize| self.reach.get(at).is_some_and(|reach| usize::from(*reach) <= side);
+        near(at) | near(at + across / 2 + down / 2 * self.stride) | near(at + across + down * self.stride)
+    }
+
+    /// As [`Marks::hold`], for any rectangle, by squares of some side.
     #[inline(never)]
-    fn hold_many(&self, [left, right]: [usize; 2], [top, bottom]: [usize; 2]) -> bool {
-        (top..bottom).any(|row| {
-            let start = row * self.width as usize;
-            (left..right).step_by(64).any(|at| self.window(start + at, (right - at).min(64)) != 0)
+    fn hold_long(&self, [left, right]: [usize; 2], [top, bottom]: [usize; 2], side: usize) -> bool {
+        (top..bottom).step_by(side).any(|y| {
+            let row = y.min(bottom - side) * self.stride;
+            (left..right).step_by(side).any(|x| {
+                let reach = self.reach.get(row + x.min(right - side));
+                reach.is_some_and(|reach| usize::from(*reach) <= side)
+            })
         })
     }
 }
@@ -145,6 +163,7 @@ mod tests {
                 marks.clear(&camera);
                 let set: Vec<u32> = (0..1 + width * height / 300).map(|_| below(width * height)).collect();
                 set.iter().for_each(|pixel| marks.set(*pixel));
+                marks.settle();
                 for _ in 0..200 {
                     let [x, y] = [below(width), below(height)];
                     let most = [3, 9, 30, 200][below(4) as usize];
@@ -152,7 +171,8 @@ mod tests {
                     let inside = |p: &u32| (x..right).contains(&(p % width)) && (y..bottom).contains(&(p / width));
                     let wanted = set.iter().any(inside);
                     let extent = [[x, right], [y, bottom]].map(|ends| ends.map(|v| v as usize));
-                    assert_eq!(marks.hold(extent[0], extent[1]), wanted, "{extent:?} in {width} x {height}");
+                    assert_eq!(marks.hold(extent), wanted, "{extent:?} in {width} x {height}");
+                    assert!(!wanted || marks.may_hold(extent), "{extent:?} in {width} x {height}");
                     held += usize::from(wanted);
                 }
             }

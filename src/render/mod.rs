@@ -3,11 +3,14 @@
 //! Not here: meshes and transforms (`geom`), comparing pictures (`vision`). Nothing in this module draws random
 //! numbers, and the same input gives the same output on every machine.
 
+mod batch;
 mod camera;
 mod camera_json;
 mod contours;
+mod coverage;
 mod crossing;
 mod frame;
+mod lanes;
 mod layers;
 mod looked;
 mod marks;
@@ -17,6 +20,7 @@ mod project;
 mod pull;
 mod raster;
 mod shade;
+mod silhouette;
 mod simd;
 mod surface;
 mod trace;
@@ -29,6 +33,7 @@ mod extremes_tests;
 #[cfg(test)]
 mod testing;
 
+pub use batch::{BatchRenderer, ContourBatch, ContourSlice, Cores, Scene};
 pub use camera::{Camera, CameraError, Projection};
 pub use contours::Contours;
 pub use frame::{Channels, Frame};

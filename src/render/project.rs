@@ -67,7 +67,7 @@ impl Lens {
     }
 
     /// Depth from nearness.
-    #[inline]
+    #[inline(always)]
     pub fn depth(&self, nearness: f64) -> f64 {
         if self.pinhole { 1.0 / nearness } else { -nearness }
     }
@@ -112,7 +112,7 @@ impl Placement {
     }
 
     /// A mesh normal in camera coordinates, outward, not of unit length.
-    #[inline]
+    #[inline(always)]
     pub fn normal(&self, n: DVec3) -> DVec3 {
         self.cofactor * n
     }
@@ -314,13 +314,23 @@ impl Vertices<'_> {
 
     /// Width and height together of what lies around some vertices, in pixels.
     pub fn span(&self, of: impl Iterator<Item = u32>) -> f32 {
-        let places = of.filter_map(|v| self.places.get(v as usize));
-        let least = places.fold(Place::INFINITY, |a, b| a.min(*b));
+        let least = self.least_among(of);
         -(least.x + least.y + least.z + least.w)
     }
 
+    #[inline(always)]
+    fn least_among(&self, of: impl Iterator<Item = u32>) -> Place {
+        of.filter_map(|v| self.places.get(v as usize)).fold(Place::INFINITY, |a, b| a.min(*b))
+    }
+
+    /// The least coordinates of some rounded positions.
+    #[inline(always)]
+    pub fn least(&self, of: &[u32]) -> Place {
+        self.least_among(of.iter().copied())
+    }
+
     /// The least coordinates of all rounded positions.
-    pub fn least(&self) -> Place {
+    pub fn least_of_all(&self) -> Place {
         self.places.iter().fold(Place::INFINITY, |a, b| a.min(*b))
     }
 
@@ -329,6 +339,13 @@ impl Vertices<'_> {
     pub fn triangle(&self, topology: &Topology, face: u32, extent: Extent, back: f64) -> Option<Triangle> {
         let corners = topology.triangles.get(face as usize)?;
         Triangle::new(corners.map(|v| self.point(v)), self.places(corners)?, extent, back)
+    }
+
+    /// Where the corners of a triangle are.
+    #[inline(always)]
+    pub fn corners(&self, topology: &Topology, face: u32) -> [Point; 3] {
+        let corners = topology.triangles.get(face as usize).copied().unwrap_or_default();
+        corners.map(|v| self.point(v))
     }
 
     /// Where a vertex is; of one that is not in view, nearness is infinite (behind the near plane) or NaN (not usable).

@@ -4,8 +4,8 @@
 //! order and at right angles to the contour, which is what counts. Which pieces are seen is taken as it is. Nothing is drawn:
 //! the pieces of the meshes are traced again, and those that were seen are told by their numbers.
 
-use super::project::{Fronts, Lens, Placement, Projected};
-use super::trace::{Origin, trace_mesh};
+use super::project::{Lens, Placement, Projected};
+use super::trace::{Origin, Room, trace_mesh};
 use super::visibility::Piece;
 use super::{Camera, Contours};
 use crate::geom::{Instance, Solid};
@@ -27,14 +27,14 @@ impl Contours {
 
     /// Calls `f` for each piece with its instance, that one's first vertex among all, and where the piece comes from.
     fn origins(&self, solid: &Solid, camera: &Camera, mut f: impl FnMut(usize, &Instance, usize, &Origin)) {
-        let (mut projected, mut fronts) = (Projected::default(), Fronts::default());
+        let (mut projected, mut room) = (Projected::default(), Room::default());
         let (mut next, mut base) = (0, 0);
         for instance in solid.instances() {
             let placement = Placement::new(camera, &instance.affine);
             projected.clear();
             projected.add(&instance.mesh, &placement, &Lens::new(camera));
             let vertices = projected.mesh(0);
-            trace_mesh(&instance.mesh, &placement, camera, &vertices, &mut fronts, |piece, origin| {
+            trace_mesh(&instance.mesh, &placement, camera, &vertices, &mut room, |piece, origin| {
                 if self.is(next, &piece) {
                     f(next, instance, base, origin);
                     next += 1;

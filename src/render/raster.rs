@@ -3,12 +3,14 @@
 //! It does no shading and keeps no state. Which pixels a triangle covers is said in [`super::triangle`].
 
 use super::Camera;
+use super::coverage::is_turned;
+use super::lanes::{Batch, Kind, LANES};
 use super::marks::Marks;
 use super::place::{Extent, place, size};
 use super::project::{DepthRange, Lens, Placement, Point, Projected, Vertices, project};
 use super::simd::vectorised;
-use super::triangle::{Triangle, is_turned};
-use crate::geom::{Mesh, Solid};
+use super::triangle::{Plane, Triangle};
+use crate::geom::{Mesh, Patches, Solid, Topology};
 use glam::{DVec3, Vec4};
 
 /// What a triangle is, besides its corners in the image.
@@ -134,52 +136,110 @@ pub(super) struct Candidates {
     faces: Vec<u32>,
     extents: Vec<Extent>,
     count: usize,
+    batch: Batch,
 }
 
 impl Candidates {
-    /// Those of one mesh all of whose vertices are in view, but for backs that need not be drawn.
-    pub fn find(&mut self, mesh: &Mesh, placement: &Placement, camera: &Camera, vertices: &Vertices<'_>) {
-        let triangles = &mesh.topology.triangles;
+    /// Those of one mesh all of whose vertices are in view, but for backs that need not be drawn; with marks, those that reach some.
+    #[inline(always)]
+    fn find(&mut self, topology: &Topology, vertices: &Vertices<'_>, size: Vec4, back: f64, marks: Option<&Marks>) {
+        let triangles = &topology.triangles;
         if self.faces.len() < triangles.len() {
             self.faces.resize(triangles.len(), 0);
             self.extents.resize(triangles.len(), Extent::default());
         }
-        let (size, back) = (size(camera.width, camera.height), back(mesh, placement, vertices));
-        self.count = vectorised(
-            #[inline(always)]
-            || match back {
-                0.0 => self.write::<false>(triangles, vertices, size, back),
-                _ => self.write::<true>(triangles, vertices, size, back),
-            },
-        );
+        self.count = 0;
+        let Some(marks) = marks else {
+            return self.add(0, triangles, vertices, size, back, |_| true);
+        };
+        for (i, (patch, triangles)) in topology.patches.of(triangles).zip(triangles.chunks(Patches::FACES)).enumerate()
+        {
+            let extent = Extent::between(vertices.least(patch), size);
+            if !extent.is_empty() && marks.hold(extent.ends()) {
+                self.add(i * Patches::FACES, triangles, vertices, size, back, |ends| marks.may_hold(ends));
+            }
+        }
+        let found = std::mem::take(&mut self.count);
+        for i in 0..found {
+            let (Some(&face), Some(&extent)) = (self.faces.get(i), self.extents.get(i)) else { continue };
+            self.put(face, extent, marks.hold(extent.ends()));
+        }
     }
 
+    /// Adds the candidates among some triangles, of which the first one is face `first`.
     #[inline(always)]
-    fn write<const FRONTS: bool>(
+    fn add(
         &mut self,
+        first: usize,
         triangles: &[[u32; 3]],
         vertices: &Vertices<'_>,
         size: Vec4,
         back: f64,
-    ) -> usize {
-        let (faces, extents) = (&mut self.faces[..], &mut self.extents[..]);
-        // Each is written down, and written over unless it counts: a branch could not be foretold.
-        let mut count = 0;
-        for (face, corners) in triangles.iter().enumerate() {
+        wanted: impl Fn([[usize; 2]; 2]) -> bool,
+    ) {
+        for (i, corners) in triangles.iter().enumerate() {
             let Some(places) = vertices.places(corners) else { continue };
             let extent = Extent::around(places, size);
-            if let (Some(f), Some(e)) = (faces.get_mut(count), extents.get_mut(count)) {
-                (*f, *e) = (face as u32, extent);
-            }
-            count += usize::from(!extent.is_empty() & !(FRONTS && is_turned(places, back)));
+            let turned = back != 0.0 && is_turned(places, back);
+            self.put((first + i) as u32, extent, !extent.is_empty() & !turned & wanted(extent.ends()));
         }
-        count
     }
 
-    /// Faces and their extents.
+    /// Each is written down, and written over unless it counts: a branch could not be foretold.
     #[inline(always)]
-    fn iter(&self) -> impl Iterator<Item = (u32, Extent)> {
-        self.faces[..self.count].iter().copied().zip(self.extents[..self.count].iter().copied())
+    fn put(&mut self, face: u32, extent: Extent, counts: bool) {
+        if let (Some(f), Some(e)) = (self.faces.get_mut(self.count), self.extents.get_mut(self.count)) {
+            (*f, *e) = (face, extent);
+        }
+        self.count += usize::from(counts);
+    }
+
+    /// Keeps the nearer of a mesh's triangles and what is there, in the rows of an area; with marks, at marked pixels at least.
+    #[inline(always)]
+    fn fill(
+        &mut self,
+        topology: &Topology,
+        vertices: &Vertices<'_>,
+        (size, back): (Vec4, f64),
+        area: &Area,
+        marks: Option<&Marks>,
+        buffer: &mut [f32],
+    ) {
+        self.find(topology, vertices, size, back, marks);
+        let (width, columns) = (area.right - area.left, [area.left, area.right]);
+        let large = |face: u32, extent: Extent, buffer: &mut [f32]| {
+            if let Some(triangle) = vertices.triangle(topology, face, extent, back) {
+                match marks {
+                    Some(marks) => triangle.fill_some(buffer, width, marks),
+                    None => triangle.fill(buffer, columns, area.top),
+                }
+            }
+        };
+        let Candidates { faces, extents, count, batch } = self;
+        let list = faces[..*count].iter().copied().zip(extents[..*count].iter().copied());
+        if width < LANES {
+            return list.for_each(|(face, extent)| large(face, extent, buffer));
+        }
+        let places = |face: u32| vertices.places(topology.triangles.get(face as usize)?);
+        let back = back as i32;
+        batch.each(list, places, area.right, back, |batch, i, face, extent, kind| {
+            if kind == Kind::Large {
+                return large(face, *extent, buffer);
+            }
+            let mut plane = None;
+            batch.rows(i, extent, area.right, |row, from, outside| {
+                let at = (row - area.top) * width + from - area.left;
+                // Without marks every lane is wanted.
+                let wanted = marks.map_or(u32::MAX, |marks| marks.window(at, LANES) as u32);
+                if marks.is_some() && wanted & !outside.to_bitmask() == 0 {
+                    return;
+                }
+                let corners = || Plane::new(&vertices.corners(topology, face), extent.ends()[0][0]);
+                if let Some(plane) = plane.get_or_insert_with(corners) {
+                    plane.keep(buffer, at, row, from, outside);
+                }
+            });
+        });
     }
 }
 
@@ -226,51 +286,35 @@ fn fill_mesh(
     area: &Area,
     buffer: &mut [f32],
 ) {
-    let (columns, top) = ([area.left, area.right], area.top);
     if !vertices.whole {
-        return cut_triangles(mesh, placement, camera, vertices, |t, _, _| t.fill(buffer, columns, top));
+        let columns = [area.left, area.right];
+        return cut_triangles(mesh, placement, camera, vertices, |t, _, _| t.fill(buffer, columns, area.top));
     }
-    candidates.find(mesh, placement, camera, vertices);
-    let back = back(mesh, placement, vertices);
+    let how = (size(camera.width, camera.height), back(mesh, placement, vertices));
     vectorised(
         #[inline(always)]
-        || {
-            for (face, extent) in candidates.iter() {
-                if let Some(triangle) = vertices.triangle(&mesh.topology, face, extent, back) {
-                    triangle.fill(buffer, columns, top);
-                }
-            }
-        },
+        || candidates.fill(&mesh.topology, vertices, how, area, None, buffer),
     );
 }
 
-/// Draws the nearness of one mesh into an image, at the marked pixels; others may be drawn at or not. The candidates are those of the mesh, if all of its vertices are in view.
+/// Draws the nearness of one mesh into an image, at the marked pixels; others may be drawn at or not.
 pub(super) fn fill_some(
     mesh: &Mesh,
     placement: &Placement,
     camera: &Camera,
     vertices: &Vertices<'_>,
-    candidates: &Candidates,
+    candidates: &mut Candidates,
     marks: &Marks,
     buffer: &mut [f32],
 ) {
-    let width = camera.width as usize;
     if !vertices.whole {
+        let width = camera.width as usize;
         return cut_triangles(mesh, placement, camera, vertices, |t, _, _| t.fill_some(buffer, width, marks));
     }
-    let back = back(mesh, placement, vertices);
+    let how = (size(camera.width, camera.height), back(mesh, placement, vertices));
     vectorised(
         #[inline(always)]
-        || {
-            for (face, extent) in candidates.iter() {
-                let [columns, rows] = extent.ends();
-                if marks.hold(columns, rows)
-                    && let Some(triangle) = vertices.triangle(&mesh.topology, face, extent, back)
-                {
-                    triangle.fill_some(buffer, width, marks);
-                }
-            }
-        },
+        || candidates.fill(&mesh.topology, vertices, how, &Area::whole(camera), Some(marks), buffer),
     );
 }
 
@@ -296,7 +340,7 @@ impl Area {
             let any = (0..vertices.len() as u32).any(|v| vertices.point(v).nearness < f64::INFINITY);
             return if any { Area::whole(camera) } else { Area::default() };
         }
-        let extent = Extent::between(vertices.least(), size(camera.width, camera.height));
+        let extent = Extent::between(vertices.least_of_all(), size(camera.width, camera.height));
         if vertices.len() == 0 || extent.is_empty() {
             return Area::default();
         }

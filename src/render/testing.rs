@@ -1,5 +1,6 @@
 //! Shapes and data folders for this module's tests.
 
+use super::project::Point;
 use crate::geom::{Mesh, Solid};
 use glam::Vec3;
 use std::path::PathBuf;
@@ -86,6 +87,18 @@ impl Uniform {
     /// The next number, between two bounds.
     pub fn between(&mut self, low: f64, high: f64) -> f64 {
         low + (high - low) * self.next()
+    }
+
+    /// A triangle of about some size in an image of 40 x 30 pixels, or partly out of it; `halves` puts corners on half pixels.
+    pub fn corners(&mut self, size: f64, halves: bool) -> [Point; 3] {
+        let middle = [self.between(-2.0, 42.0), self.between(-2.0, 32.0)];
+        std::array::from_fn(|_| {
+            let [x, y] = middle.map(|at| {
+                let v = at + size * (self.next() - 0.5);
+                if halves { (v * 2.0).round() / 2.0 } else { v }
+            });
+            Point { x, y, nearness: 0.3 + self.next() }
+        })
     }
 }
 

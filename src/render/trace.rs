@@ -5,6 +5,8 @@
 
 use super::Camera;
 use super::project::{Fronts, Lens, Placement, Point, Vertices};
+use super::silhouette::{self, Crossed};
+use super::simd::vectorised;
 use super::visibility::{Image, Look, Piece};
 use crate::geom::{Edge, Mesh};
 use glam::DVec3;
@@ -28,29 +30,43 @@ pub(super) struct Origin {
     pub share: f64,
 }
 
-/// Calls `out` for every piece of a mesh, in the order of its faces and edges. `vertices` are its own in the image; `fronts` is
-/// overwritten.
+/// What tracing needs room for. Reused from mesh to mesh.
+#[derive(Default)]
+pub(super) struct Room {
+    fronts: Fronts,
+    crossed: Crossed,
+}
+
+/// Calls `out` for every piece of a mesh, in the order of its faces and edges. `vertices` are its own in the image.
 pub(super) fn trace_mesh(
     mesh: &Mesh,
     placement: &Placement,
     camera: &Camera,
     vertices: &Vertices<'_>,
-    fronts: &mut Fronts,
+    Room { fronts, crossed }: &mut Room,
     out: impl FnMut(Piece, &Origin),
 ) {
     let Some(image) = Image::new(camera.width, camera.height) else { return };
     let size = [f64::from(camera.width), f64::from(camera.height)];
     fronts.find(mesh, placement);
-    let (lens, facing) = (Lens::new(camera), &fronts.facing[..]);
-    let mut tracer = Tracer { mesh, placement, vertices, open: true, facing, lens, image, size, out };
+    let lens = Lens::new(camera);
+    let mut tracer = Tracer { mesh, placement, vertices, open: true, lens, image, size, out };
     // Through holes too small to be seen nothing is seen.
     let hole = |line: &[Edge]| line.first().is_some_and(Edge::is_boundary) && !tracer.is_speck(line);
     tracer.open = mesh.topology.edges.open() && mesh.topology.edges.lines().any(hole);
-    tracer.trace(&fronts.front);
+    let signs = (&fronts.facing[..], &fronts.front[..]);
+    vectorised(
+        #[inline(always)]
+        || crossed.each(mesh, placement, &lens, vertices, signs, |batch, count| tracer.silhouettes(batch, count)),
+    );
+    tracer.edges();
 }
 
 /// Lines of edges, holes say, that are less than this high and wide together, in pixels, are left out.
 const SPECK: f32 = 0.1;
+
+/// The length in pixels from which on segments are divided.
+const LONGEST: f64 = 1.5;
 
 /// A segment's corners and ends, as in [`Origin`].
 type Segment = ([u32; 3], [[f64; 3]; 2]);
@@ -61,7 +77,6 @@ struct Tracer<'a, F> {
     vertices: &'a Vertices<'a>,
     /// Whether the mesh has boundaries that can be seen, so that insides of faces may be.
     open: bool,
-    facing: &'a [f64],
     lens: Lens,
     image: Image,
     /// Pixels across and down.
@@ -70,55 +85,38 @@ struct Tracer<'a, F> {
 }
 
 impl<F: FnMut(Piece, &Origin)> Tracer<'_, F> {
-    fn trace(&mut self, front: &[bool]) {
-        for face in &self.mesh.topology.triangles {
-            let [Some(&a), Some(&b), Some(&c)] = face.map(|v| front.get(v as usize)) else { continue };
-            if (a ^ b) | (a ^ c) {
-                // The corner that differs from the other two.
-                let odd = if a == b { 2 } else { usize::from(a == c) };
-                self.silhouette([odd, (odd + 1) % 3, (odd + 2) % 3].map(|i| face[i]));
+    /// Pieces of some silhouettes.
+    #[inline(always)]
+    fn silhouettes(&mut self, batch: &silhouette::Batch, count: usize) {
+        for i in 0..count.min(silhouette::MOST) {
+            if !batch.there[i] {
+                continue;
+            }
+            let ([a, b], length) = (batch.segment(i), batch.length[i]);
+            let [tangent, direction, middle] =
+                [&batch.tangent, &batch.outward, &batch.middle].map(|pair| [pair[0][i], pair[1][i]]);
+            let slack = batch.slack[i];
+            let look = match self.open {
+                false => Look::Outward { direction, slack },
+                true => Look::BothSides { direction, slack: [slack; 2] },
+            };
+            if length < LONGEST && self.inside(&a) && self.inside(&b) && batch.depth[i].is_finite() {
+                // Nearly all are one piece.
+                let piece = self.image.piece(middle, batch.depth[i], tangent, length, &look, false);
+                (self.out)(piece, &Origin { corners: batch.corners[i], ends: batch.weights(i), at: 0.5, share: 1.0 });
+            } else {
+                self.cut(&a, &b, length, tangent, &look, false, (batch.corners[i], batch.weights(i)));
             }
         }
+    }
+
+    /// Pieces of creases and boundaries.
+    fn edges(&mut self) {
         for line in self.mesh.topology.edges.lines() {
             if !self.is_speck(line) {
                 line.iter().for_each(|edge| self.edge(edge.vertices, edge.faces));
             }
         }
-    }
-
-    /// The zero set in one face; the first corner's sign differs from the others'.
-    fn silhouette(&mut self, corners: [u32; 3]) {
-        let Tracer { mesh, placement, vertices, open, facing, .. } = *self;
-        let own = corners.map(|v| vertices.point(v));
-        if own.iter().any(|p| p.nearness.is_nan()) || !own.iter().any(usable) {
-            return;
-        }
-        let p = corners.map(|v| mesh.positions[v as usize].as_dvec3());
-        let n = corners.map(|v| mesh.normals[v as usize].as_dvec3());
-        let facing = corners.map(|v| facing[v as usize]);
-        let share = |i: usize| facing[0] / (facing[0] - facing[i]);
-        let (u, v) = (share(1), share(2));
-        let (from, to) = (p[0] + (p[1] - p[0]) * u, p[0] + (p[2] - p[0]) * v);
-        let Some((a, b)) = self.segment(placement.point(from), placement.point(to)) else { return };
-        let normal = placement.normal(n[0] * 2.0 + (n[1] - n[0]) * u + (n[2] - n[0]) * v);
-        let Some([tx, ty, length]) = tangent(&a, &b) else { return };
-        // The plane through the eye with this normal cuts the image in a line at right angles to (x, y) of it.
-        let size = (normal.x * normal.x + normal.y * normal.y).sqrt();
-        let direction = if size > 1e-12 { [normal.x / size, -normal.y / size] } else { [ty, -tx] };
-        let slack = if own.iter().all(usable) {
-            let steep = if length > 0.02 { (b.nearness - a.nearness) / length } else { 0.0 };
-            let ahead = own.iter().map(|p| p.nearness - a.nearness - steep * ((p.x - a.x) * tx + (p.y - a.y) * ty));
-            self.in_depth(ahead.fold(0.0, f64::max), &a)
-        } else {
-            0.0
-        };
-        let look = match open {
-            false => Look::Outward { direction, slack },
-            true => Look::BothSides { direction, slack: [slack; 2] },
-        };
-        let flip = ty * direction[0] - tx * direction[1] < 0.0;
-        let ends = [[1.0 - u, u, 0.0], [1.0 - v, 0.0, v]];
-        self.cut(&a, &b, length, if flip { [-tx, -ty] } else { [tx, ty] }, &look, false, (corners, ends));
     }
 
     /// Whether a whole line of edges is too small to be seen.
@@ -195,19 +193,23 @@ impl<F: FnMut(Piece, &Origin)> Tracer<'_, F> {
         Some((self.lens.point(from), self.lens.point(to)))
     }
 
+    /// Whether a point is in the image.
+    #[inline(always)]
+    fn inside(&self, p: &Point) -> bool {
+        p.x >= 0.0 && p.y >= 0.0 && p.x <= self.size[0] && p.y <= self.size[1]
+    }
+
     /// Clips a segment of some length to the image and divides it.
     #[allow(clippy::too_many_arguments)]
     fn cut(&mut self, a: &Point, b: &Point, length: f64, tangent: [f64; 2], look: &Look, edge: bool, from: Segment) {
         let (dx, dy) = (b.x - a.x, b.y - a.y);
-        let inside = |p: &Point| p.x >= 0.0 && p.y >= 0.0 && p.x <= self.size[0] && p.y <= self.size[1];
-        let part = if inside(a) && inside(b) { Some((0.0, 1.0)) } else { clip(a, [dx, dy], self.size) };
+        let part = if self.inside(a) && self.inside(b) { Some((0.0, 1.0)) } else { clip(a, [dx, dy], self.size) };
         let Some((t0, t1)) = part else { return };
         let length = length * (t1 - t0);
         if !(length > 1e-9 && length.is_finite()) {
             return;
         }
-        // Most are less than a pixel long.
-        let pieces = if length < 1.5 { 1.0 } else { (length + 0.5).floor() };
+        let pieces = if length < LONGEST { 1.0 } else { (length + 0.5).floor() };
         let step = (t1 - t0) / pieces;
         for i in 0..pieces as usize {
             let t = t0 + step * (i as f64 + 0.5);

@@ -3,7 +3,7 @@
 //! Not a scene graph and not mutable: another pose is another `View`. Invariant: for one image size the frame, the depth and the
 //! contours are computed once, and every caller gets the same `Arc`.
 
-use super::{Camera, Channels, Contours, Frame};
+use super::{Camera, Channels, Contours, Frame, Scene};
 use crate::geom::Solid;
 use glam::DVec3;
 use std::sync::{Arc, Mutex, PoisonError};
@@ -34,6 +34,11 @@ impl View {
     /// The camera at its full image size.
     pub fn camera(&self) -> &Camera {
         &self.camera
+    }
+
+    /// What is drawn in the picture whose longer side has `size` pixels (0 counts as 1).
+    pub fn scene(&self, size: u32) -> Scene {
+        Scene { solid: self.solid.clone(), camera: self.camera.scaled_to(size) }
     }
 
     /// All channels of the picture whose longer side has `size` pixels (0 counts as 1).

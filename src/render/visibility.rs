@@ -87,15 +87,15 @@ impl Image {
     }
 
     /// The look at the pixel that holds a position, or the nearest one.
-    #[inline]
+    #[inline(always)]
     fn side(&self, x: f64, y: f64, slack: f64) -> Side {
         let inside = x >= 0.0 && y >= 0.0 && x < self.width as f64 && y < self.height as f64;
-        let (column, row) = ((x.max(0.0) as usize).min(self.width - 1), (y.max(0.0) as usize).min(self.height - 1));
-        Side { pixel: (row * self.width + column) as u32, inside, slack }
+        let index = |v: f64, side: usize| v.max(0.0).min((side - 1) as f64) as i32 as usize;
+        Side { pixel: (index(y, self.height) * self.width + index(x, self.width)) as u32, inside, slack }
     }
 
     /// A piece with its middle at a position and depth, of an edge or of a smooth silhouette.
-    #[inline]
+    #[inline(always)]
     pub fn piece(
         &self,
         [x, y]: [f64; 2],

@@ -8,7 +8,7 @@
 use super::morph::{Anchor, Morph};
 use super::recent;
 use super::{JointPose, RestGradient, Rig, Rules};
-use crate::geom::{Edges, GeomError, Landmark, Mesh, Solid, Topology, edges, outer};
+use crate::geom::{GeomError, Landmark, Mesh, Solid, Topology, edges, outer};
 use glam::{Affine3A, DAffine3, DVec3, Mat3A, Vec3, Vec3A};
 use std::sync::{Arc, LazyLock};
 
@@ -390,9 +390,8 @@ fn parts(joints: usize, triangles: &[[u32; 3]], influences: &[Influence]) -> Vec
             parts: vec![0; faces.len()],
             triangles: faces,
             part_count: 1,
-            part_names: Vec::new(),
-            edges: Edges::default(),
             encloses: true,
+            ..Topology::default()
         };
         parts.push(Part { joint: joint as u16, topology: Arc::new(topology), vertices, joints: used });
     }

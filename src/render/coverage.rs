@@ -1,0 +1,118 @@
+//! Which pixels a triangle covers, exactly.
+//!
+//! Corners are rounded to 1/1024 of a pixel and edges worked out in integers, so triangles that share an edge neither overlap nor
+//! leave gaps, at any size: a pixel belongs to a triangle when its centre is inside, centres on an edge go to the triangle to the
+//! right of or below it (the top-left rule). Any triangle is told here, by runs; small ones of whole meshes are told by
+//! [`super::lanes`].
+
+use super::crossing::{Crossing, Int};
+use super::place::{BITS, Extent, Place, UNIT, is_near};
+use super::project::Point;
+
+/// Corners are kept inside this, in units.
+const FARTHEST: i64 = 1 << 60;
+/// The pixels of a triangle.
+pub(super) struct Coverage {
+    places: [Place; 3],
+    /// Whether they lie clockwise as seen in the image.
+    clockwise: bool,
+    /// Columns and rows, from the first one to that past the last one.
+    pub columns: [usize; 2],
+    pub rows: [usize; 2],
+}
+
+/// The centre of a pixel in units.
+#[inline(always)]
+fn centre(pixel: usize) -> i32 {
+    (pixel as i32) << BITS
+}
+
+/// A corner in units, also where its place cannot hold it.
+fn units(place: Place, point: &Point) -> [i64; 2] {
+    let [x, y, ..] = place.to_array();
+    if is_near(place) {
+        return [x, y].map(|v| (v * UNIT as f32) as i64);
+    }
+    // In single precision, which is all that is kept of most points.
+    [point.x, point.y].map(|v| {
+        let v = (f64::from(v as f32) - 0.5) * f64::from(UNIT);
+        ((v + if v < 0.0 { -0.5 } else { 0.5 }) as i64).clamp(-FARTHEST, FARTHEST)
+    })
+}
+
+/// Which way round near places lie in the image: above 0 clockwise, below counter-clockwise, 0 without area.
+#[inline(always)]
+fn turn([a, b, c]: [Place; 3]) -> f64 {
+    // Differences of places are exact in single precision, their products in double precision.
+    let (b, c) = ((b - a).to_array().map(f64::from), (c - a).to_array().map(f64::from));
+    b[0] * c[1] - b[1] * c[0]
+}
+
+/// The same for places of which some are not near.
+#[inline(never)]
+fn far_turn(places: &[Place; 3], points: &[Point; 3]) -> f64 {
+    let [a, b, c] = std::array::from_fn(|i| units(places[i], &points[i]).map(i128::from));
+    ((b[0] - a[0]) * (c[1] - a[1]) - (b[1] - a[1]) * (c[0] - a[0])).signum() as f64
+}
+
+/// Whether corners are known to turn that way, as [`Coverage::new`] has it.
+#[inline(always)]
+pub(super) fn is_turned(places: [Place; 3], back: f64) -> bool {
+    let [a, b, c] = places;
+    is_near(a.min(b).min(c)) & (turn(places) * back > 0.0)
+}
+
+impl Coverage {
+    /// `None` when there are no pixels. With `back`, also when it turns that way: clockwise in the image if above 0, the other way if
+    /// below. The corners as they are, `points`, count only where they are far out.
+    #[inline(always)]
+    pub fn new(places: [Place; 3], points: impl Fn() -> [Point; 3], extent: Extent, back: f64) -> Option<Coverage> {
+        let [a, b, c] = places;
+        let least = a.min(b).min(c);
+        let turn = if is_near(least) { turn(places) } else { far_turn(&places, &points()) };
+        if turn == 0.0 || turn * back > 0.0 {
+            return None;
+        }
+        let [columns, rows] = extent.ends();
+        Some(Coverage { places, clockwise: turn > 0.0, columns, rows })
+    }
+
+    /// Edges as functions that are not negative inside: value at a pixel's centre, change by column, change by row.
+    #[inline(always)]
+    fn edges<N: Int>(&self, corners: [[N; 2]; 3], [x, y]: [N; 2]) -> [[N; 3]; 3] {
+        let (zero, one, unit) = (N::from(0), N::from(1), N::from(UNIT));
+        // Counter-clockwise, every edge runs the other way. No branches: they could not be foretold.
+        let way = N::from(2 * i32::from(self.clockwise) - 1);
+        std::array::from_fn(|i| {
+            let (p, q) = (corners[i], corners[(i + 1) % 3]);
+            let (dx, dy) = ((q[0] - p[0]) * way, (q[1] - p[1]) * way);
+            // Left and top edges have the centres on them.
+            let has = (dy < zero) | ((dy == zero) & (dx > zero));
+            let at = dx * (y - p[1]) - dy * (x - p[0]) + N::from(i32::from(has)) - one;
+            [at, (zero - dy) * unit, dx * unit]
+        })
+    }
+
+    /// Calls `draw` for every row's run of pixels: row, first column, the column past the last one.
+    pub fn runs(&self, points: &[Point; 3], draw: impl FnMut(usize, usize, usize)) {
+        // Products of two differences must fit.
+        let corners: [[i64; 2]; 3] = std::array::from_fn(|i| units(self.places[i], &points[i]));
+        let near = corners.as_flattened().iter().all(|v| v.abs() < 1 << 29);
+        if near { self.runs_in(corners, draw) } else { self.runs_in(corners.map(|p| p.map(i128::from)), draw) }
+    }
+
+    fn runs_in<N: Int>(&self, corners: [[N; 2]; 3], mut draw: impl FnMut(usize, usize, usize)) {
+        let Coverage { columns: [first, past], rows, .. } = *self;
+        let start = [centre(first), centre(rows[0])].map(N::from);
+        let mut edges = self.edges(corners, start).map(Crossing::new);
+        for row in rows[0]..rows[1] {
+            let (mut from, mut to) = (N::from(0), N::from((past - first) as i32));
+            for edge in &mut edges {
+                edge.narrow(&mut from, &mut to);
+            }
+            if from < to {
+                draw(row, first + from.index(), first + to.index());
+            }
+        }
+    }
+}

@@ -1,0 +1,271 @@
+//! Smooth silhouettes: in each face that they cross, the zero set of the (interpolated) facing, many faces at a time.
+
+use super::Camera;
+use super::project::{Lens, Placement, Point, Vertices};
+use crate::geom::{Mesh, Patches, Topology};
+use glam::DVec3;
+
+/// Faces worked on at a time.
+pub(super) const MOST: usize = 64;
+
+/// A number for each face.
+type Row = [f64; MOST];
+
+/// The faces that silhouettes cross, and what of them lies in each. Reused from mesh to mesh.
+#[derive(Default)]
+pub(super) struct Crossed {
+    faces: Vec<u32>,
+    count: usize,
+    batch: Batch,
+}
+
+/// Segments of silhouettes in the image, some faces at a time. Pairs are the two ends, threes of rows the axes.
+pub(super) struct Batch {
+    /// The vertices of each face; the first one's sign differs from the others'.
+    pub corners: [[u32; 3]; MOST],
+    /// Whether there is a segment.
+    pub there: [bool; MOST],
+    /// How far along the sides from the first corner the ends lie, as a share.
+    pub shares: [Row; 2],
+    /// The ends in the image: x, y, nearness.
+    pub ends: [[Row; 3]; 2],
+    /// Pixels.
+    pub length: Row,
+    /// Unit vector from the first end to the second, turned so that outward lies to the left of it.
+    pub tangent: [Row; 2],
+    /// Unit vector away from the surface.
+    pub outward: [Row; 2],
+    /// How much nearer than the silhouette the face reaches, in scene units.
+    pub slack: Row,
+    /// Half way between the ends in the image.
+    pub middle: [Row; 2],
+    /// Scene units, there.
+    pub depth: Row,
+    /// Position, normal and facing of the corners in the mesh's coordinates; the same corners in the image.
+    positions: [[Row; 3]; 3],
+    normals: [[Row; 3]; 3],
+    facing: [Row; 3],
+    image: [[Row; 3]; 3],
+    /// Ends and normal in camera coordinates.
+    camera: [[Row; 3]; 2],
+    normal: [Row; 3],
+}
+
+impl Default for Batch {
+    fn default() -> Batch {
+        let three = [[0.0; MOST]; 3];
+        Batch {
+            corners: [[0; 3]; MOST],
+            there: [false; MOST],
+            shares: [[0.0; MOST]; 2],
+            ends: [three; 2],
+            length: [0.0; MOST],
+            tangent: [[0.0; MOST]; 2],
+            outward: [[0.0; MOST]; 2],
+            slack: [0.0; MOST],
+            middle: [[0.0; MOST]; 2],
+            depth: [0.0; MOST],
+            positions: [three; 3],
+            normals: [three; 3],
+            facing: three,
+            image: [three; 3],
+            camera: [three; 2],
+            normal: three,
+        }
+    }
+}
+
+impl Crossed {
+    /// Calls `out` with the segments in all faces of a mesh, in their order, some at a time, and how many there are; `facing` and
+    /// whether it is not negative by vertex.
+    #[inline(always)]
+    pub fn each(
+        &mut self,
+        mesh: &Mesh,
+        placement: &Placement,
+        lens: &Lens,
+        vertices: &Vertices<'_>,
+        (facing, front): (&[f64], &[bool]),
+        mut out: impl FnMut(&Batch, usize),
+    ) {
+        self.find(&mesh.topology, front);
+        let Crossed { faces, count, batch } = self;
+        for faces in faces[..*count].chunks(MOST) {
+            for (i, face) in faces.iter().enumerate() {
+                let Some(face) = mesh.topology.triangles.get(*face as usize) else { continue };
+                batch.set(i, first_odd(face, front), mesh, vertices, facing);
+            }
+            batch.cross(placement);
+            if !vertices.whole {
+                batch.cut(faces.len());
+            }
+            if lens.pinhole {
+                batch.draw::<true>(lens)
+            } else {
+                batch.draw::<false>(lens)
+            }
+            if !vertices.whole {
+                batch.no_slack_behind(faces.len());
+            }
+            out(batch, faces.len());
+        }
+    }
+
+    /// Finds the faces whose corners do not all have the same sign.
+    #[inline(always)]
+    fn find(&mut self, topology: &Topology, front: &[bool]) {
+        let (triangles, patches) = (&topology.triangles, topology.patches.of(&topology.triangles));
+        if self.faces.len() < triangles.len() {
+            self.faces.resize(triangles.len(), 0);
+        }
+        let faces = &mut self.faces[..];
+        let mut count = 0;
+        for (i, (patch, triangles)) in patches.zip(triangles.chunks(Patches::FACES)).enumerate() {
+            let (mut some, mut all) = (false, true);
+            for v in patch {
+                let front = front.get(*v as usize).copied().unwrap_or_default();
+                (some, all) = (some | front, all & front);
+            }
+            if some == all {
+                continue;
+            }
+            for (face, corners) in (i * Patches::FACES..).zip(triangles) {
+                let [Some(&a), Some(&b), Some(&c)] = corners.map(|v| front.get(v as usize)) else { continue };
+                // Each is written down, and written over unless it counts: a branch could not be foretold.
+                if let Some(place) = faces.get_mut(count) {
+                    *place = face as u32;
+                }
+                count += usize::from((a ^ b) | (a ^ c));
+            }
+        }
+        self.count = count;
+    }
+}
+
+/// The corners of a face from the one on that differs from the two others.
+#[inline(always)]
+fn first_odd(&[a, b, c]: &[u32; 3], front: &[bool]) -> [u32; 3] {
+    let front = |v: u32| front.get(v as usize).copied().unwrap_or_default();
+    match (front(a) == front(b), front(a) == front(c)) {
+        (true, _) => [c, a, b],
+        (false, true) => [b, c, a],
+        (false, false) => [a, b, c],
+    }
+}
+
+impl Batch {
+    /// The two ends of a segment in the image.
+    #[inline(always)]
+    pub fn segment(&self, i: usize) -> [Point; 2] {
+        self.ends.each_ref().map(|[x, y, nearness]| Point { x: x[i], y: y[i], nearness: nearness[i] })
+    }
+
+    /// The same as shares of the corners.
+    #[inline(always)]
+    pub fn weights(&self, i: usize) -> [[f64; 3]; 2] {
+        let [u, v] = [self.shares[0][i], self.shares[1][i]];
+        [[1.0 - u, u, 0.0], [1.0 - v, 0.0, v]]
+    }
+
+    #[inline(always)]
+    fn set(&mut self, i: usize, corners: [u32; 3], mesh: &Mesh, vertices: &Vertices<'_>, facing: &[f64]) {
+        self.corners[i] = corners;
+        for (k, v) in corners.into_iter().enumerate() {
+            let (at, point) = (v as usize, vertices.point(v));
+            let [p, n] =
+                [&mesh.positions, &mesh.normals].map(|list| list.get(at).copied().unwrap_or_default().as_dvec3());
+            for axis in 0..3 {
+                (self.positions[k][axis][i], self.normals[k][axis][i]) = (p[axis], n[axis]);
+            }
+            [self.image[k][0][i], self.image[k][1][i], self.image[k][2][i]] = [point.x, point.y, point.nearness];
+            self.facing[k][i] = facing.get(at).copied().unwrap_or_default();
+        }
+    }
+
+    /// Where the silhouettes cross the sides of the faces, in camera coordinates.
+    #[inline(always)]
+    fn cross(&mut self, placement: &Placement) {
+        let placement = *placement;
+        let Batch { positions: [p, q, r], normals: [l, m, n], facing: [f, g, h], .. } = self;
+        let (shares, camera, normal) = (&mut self.shares, &mut self.camera, &mut self.normal);
+        for i in 0..MOST {
+            let (u, v) = (f[i] / (f[i] - g[i]), f[i] / (f[i] - h[i]));
+            let vector = |rows: &[Row; 3]| DVec3::new(rows[0][i], rows[1][i], rows[2][i]);
+            let (p, q, r) = (vector(p), vector(q), vector(r));
+            let (l, m, n) = (vector(l), vector(m), vector(n));
+            let from = placement.point(p + (q - p) * u);
+            let to = placement.point(p + (r - p) * v);
+            let out = placement.normal(l * 2.0 + (m - l) * u + (n - l) * v);
+            (shares[0][i], shares[1][i]) = (u, v);
+            for axis in 0..3 {
+                camera[0][axis][i] = from[axis];
+                camera[1][axis][i] = to[axis];
+                normal[axis][i] = out[axis];
+            }
+            self.there[i] = true;
+        }
+    }
+
+    /// Cuts the segments at the near plane.
+    #[inline(never)]
+    fn cut(&mut self, count: usize) {
+        for i in 0..count {
+            let near = -Camera::NEAR;
+            let nearness = self.image.each_ref().map(|at| at[2][i]);
+            let seen = nearness.iter().any(|n| *n < f64::INFINITY) && !nearness.iter().any(|n| n.is_nan());
+            let [from, to] = self.camera.each_ref().map(|end| DVec3::new(end[0][i], end[1][i], end[2][i]));
+            self.there[i] = seen && !(from.z > near && to.z > near);
+            if self.there[i] && (from.z > near || to.z > near) {
+                let mut at = from + (to - from) * ((near - from.z) / (to.z - from.z));
+                at.z = near;
+                let end = &mut self.camera[usize::from(from.z <= near)];
+                [end[0][i], end[1][i], end[2][i]] = at.to_array();
+            }
+        }
+    }
+
+    /// Where the segments are in the image.
+    #[inline(always)]
+    fn draw<const PINHOLE: bool>(&mut self, lens: &Lens) {
+        let lens = Lens { pinhole: PINHOLE, ..*lens };
+        let Batch { camera, normal, image, ends, length, tangent, outward, slack, middle, depth, there, .. } = self;
+        for i in 0..MOST {
+            let [a, b] = camera.each_ref().map(|end| lens.point(DVec3::new(end[0][i], end[1][i], end[2][i])));
+            let (dx, dy) = (b.x - a.x, b.y - a.y);
+            let long = (dx * dx + dy * dy).sqrt();
+            let (tx, ty) = (dx / long, dy / long);
+            // The plane through the eye with this normal cuts the image in a line at right angles to (x, y) of it.
+            let (nx, ny) = (normal[0][i], normal[1][i]);
+            let size = (nx * nx + ny * ny).sqrt();
+            let sound = size > 1e-12;
+            let (ox, oy) = (if sound { nx / size } else { ty }, if sound { -ny / size } else { -tx });
+            let steep = if long > 0.02 { (b.nearness - a.nearness) / long } else { 0.0 };
+            let ahead = image
+                .each_ref()
+                .map(|[x, y, nearness]| nearness[i] - a.nearness - steep * ((x[i] - a.x) * tx + (y[i] - a.y) * ty));
+            let most = ahead.into_iter().fold(0.0, |m, x| if x > m { x } else { m });
+            slack[i] = if PINHOLE { most / (a.nearness * a.nearness) } else { most };
+            let way = if ty * ox - tx * oy < 0.0 { -1.0 } else { 1.0 };
+            for (end, point) in ends.iter_mut().zip([a, b]) {
+                (end[0][i], end[1][i], end[2][i]) = (point.x, point.y, point.nearness);
+            }
+            (middle[0][i], middle[1][i]) = (a.x + dx * 0.5, a.y + dy * 0.5);
+            depth[i] = lens.depth(a.nearness + (b.nearness - a.nearness) * 0.5);
+            length[i] = long;
+            (tangent[0][i], tangent[1][i]) = (way * tx, way * ty);
+            (outward[0][i], outward[1][i]) = (ox, oy);
+        }
+        for i in 0..MOST {
+            there[i] &= (length[i] > 1e-9) & (length[i] < f64::INFINITY);
+        }
+    }
+
+    /// Of a face that is not all in view it is not known how near it comes.
+    fn no_slack_behind(&mut self, count: usize) {
+        for i in 0..count {
+            if !self.image.iter().all(|at| at[2][i] < f64::INFINITY) {
+                self.slack[i] = 0.0;
+            }
+        }
+    }
+}
