@@ -109,6 +109,21 @@ impl Contours {
         self.length.push(piece.length);
     }
 
+    /// Removes all pieces.
+    pub(super) fn clear(&mut self) {
+        let Contours { x, y, tx, ty, length, .. } = self;
+        [x, y, tx, ty, length].into_iter().for_each(Vec::clear);
+    }
+
+    /// Adds another's pieces.
+    pub(super) fn append(&mut self, other: &Contours) {
+        self.x.extend_from_slice(&other.x);
+        self.y.extend_from_slice(&other.y);
+        self.tx.extend_from_slice(&other.tx);
+        self.ty.extend_from_slice(&other.ty);
+        self.length.extend_from_slice(&other.length);
+    }
+
     /// Number of pieces.
     pub fn len(&self) -> usize {
         self.x.len()

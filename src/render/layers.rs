@@ -1,7 +1,8 @@
 //! What each mesh of a solid adds to the picture, kept from drawing to drawing: its depth in a rectangle, its pieces of contour
-//! before any is hidden, its depth range. When one part of a body has moved, the others are not drawn again.
+//! before any is hidden, its depth range. When one part of a body has moved, the others are not drawn again; the picture is
+//! composed anew, the nearest layer at each pixel, only where layers came or went, and of the other layers' pieces only those of
+//! layers that look there are looked at again.
 //!
-//! Not a cache of pictures: those are composed every time, the nearest layer at each pixel, and every piece is looked at anew.
 //! Invariant: a layer is a function of mesh, placement and camera alone, and 1 / q falls as q grows, in `f32` too, so the
 //! nearest of the layers' depths is the depth drawn at once, and the contours are those drawn at once, bit for bit.
 
@@ -11,7 +12,7 @@ use super::project::{DepthRange, Lens, Placement, Projected};
 use super::raster::{Area, Candidates, draw_mesh};
 use super::simd::vectorised;
 use super::trace::{Room, trace_mesh};
-use super::visibility::{Depths, Piece};
+use super::visibility::{BESIDE, Depths, Piece};
 use super::{Camera, Projection};
 use crate::geom::{Affine, Instance, Mesh, Solid};
 use std::cell::RefCell;
@@ -37,6 +38,10 @@ struct Layer {
     depth: Vec<f32>,
     range: DepthRange,
     pieces: Vec<Piece>,
+    /// Holds all pixels that the pieces look at.
+    looks: Area,
+    /// The pieces seen in the picture it was shown in last.
+    seen: Contours,
 }
 
 /// A layer and what it belongs to.
@@ -47,7 +52,21 @@ struct Slot {
     camera: [u64; 17],
     /// The drawing that used it last.
     used: u64,
+    /// The drawing in which it was last told which of its pieces are seen.
+    seen_at: u64,
+    /// The drawing that made it, and the slot: no two layers have the same.
+    made: (u64, usize),
     layer: Layer,
+}
+
+/// A layer in the picture.
+#[derive(Clone, Copy, Debug, PartialEq)]
+struct Shown {
+    /// Its slot.
+    at: usize,
+    /// As in [`Slot`].
+    made: (u64, usize),
+    area: Area,
 }
 
 /// A thread's layers, and the picture composed last.
@@ -58,14 +77,16 @@ struct Layers {
     clock: u64,
     /// Memory of all layers.
     bytes: usize,
-    /// The slot of each mesh in the picture.
-    shown: Vec<usize>,
+    /// Each mesh's layer in the picture.
+    shown: Vec<Shown>,
     /// Depth of the picture.
     depth: Vec<f32>,
     /// Size of the picture.
     size: [u32; 2],
-    /// Outside this the picture shows nothing.
-    drawn: Area,
+    /// Depth range of the picture.
+    extent: f64,
+    /// Where layers came or went.
+    dirty: Vec<Area>,
     projected: Projected,
     candidates: Candidates,
     room: Room,
@@ -90,14 +111,22 @@ pub(super) fn contours(solid: &Solid, camera: &Camera) -> Option<Contours> {
 impl Layers {
     fn contours(&mut self, solid: &Solid, camera: &Camera) -> Option<Contours> {
         let range = self.compose(solid, camera);
-        let depths = Depths::new(&self.depth, camera.width, camera.height, range.extent())?;
+        let same_range = self.extent.to_bits() == range.extent().to_bits();
+        self.extent = range.extent();
+        let depths = Depths::new(&self.depth, camera.width, camera.height, self.extent)?;
         let mut out = Contours::with_room(camera, self.found);
-        for slot in self.shown.iter().filter_map(|&at| self.slots.get(at)) {
-            for piece in &slot.layer.pieces {
-                if depths.visible(piece) {
-                    out.push(piece);
-                }
+        for shown in &self.shown {
+            let Some(slot) = self.slots.get_mut(shown.at) else { continue };
+            let seen_before = slot.seen_at + 1 == self.clock || slot.seen_at == self.clock;
+            let layer = &mut slot.layer;
+            if !(same_range && seen_before) || self.dirty.iter().any(|dirty| dirty.meets(&layer.looks)) {
+                self.bytes -= layer.bytes();
+                layer.seen.clear();
+                layer.pieces.iter().filter(|piece| depths.visible(piece)).for_each(|piece| layer.seen.push(piece));
+                self.bytes += layer.bytes();
             }
+            slot.seen_at = self.clock;
+            out.append(&layer.seen);
         }
         self.found = out.len();
         self.trim();
@@ -107,11 +136,16 @@ impl Layers {
     /// Brings the depth picture and the list of layers in it up to date.
     fn compose(&mut self, solid: &Solid, camera: &Camera) -> DepthRange {
         self.clock += 1;
-        self.clear(camera);
+        self.dirty.clear();
+        let (size, width) = ([camera.width, camera.height], camera.width as usize);
+        if self.size != size || self.depth.len() != camera.pixels() {
+            self.depth.clear();
+            self.depth.resize(camera.pixels(), f32::INFINITY);
+            self.shown.clear();
+            self.size = size;
+        }
         let eye = camera_bits(camera);
-        let width = camera.width as usize;
         let mut range = DepthRange::EMPTY;
-        self.shown.resize(solid.instances().len(), usize::MAX);
         for (i, instance) in solid.instances().iter().enumerate() {
             let affine = affine_bits(&instance.affine);
             let is_it = |slot: &Slot| {
@@ -120,36 +154,41 @@ impl Layers {
                     && slot.camera == eye
             };
             // Most often it is where it was.
-            let before = self.shown.get(i).copied().filter(|&at| self.slots.get(at).is_some_and(is_it));
-            let found = before.or_else(|| self.slots.iter().position(is_it));
+            let before = self.shown.get(i).copied();
+            let kept = before.map(|shown| shown.at).filter(|&at| self.slots.get(at).is_some_and(is_it));
+            let found = kept.or_else(|| self.slots.iter().position(is_it));
             let at = found.unwrap_or_else(|| self.draw(instance, camera, affine, eye));
-            let (Some(slot), Some(shown)) = (self.slots.get_mut(at), self.shown.get_mut(i)) else { continue };
-            *shown = at;
+            let Some(slot) = self.slots.get_mut(at) else { continue };
             slot.used = self.clock;
             range = range.and(&slot.layer.range);
-            vectorised(
-                #[inline(always)]
-                || slot.layer.show(&mut self.depth, width),
-            );
-            self.drawn = self.drawn.with(&slot.layer.area);
+            let now = Shown { at, made: slot.made, area: slot.layer.area };
+            match self.shown.get_mut(i) {
+                Some(shown) => *shown = now,
+                None => self.shown.push(now),
+            }
+            if before.is_none_or(|before| before.made != now.made) {
+                self.dirty.extend([before.map(|shown| shown.area).unwrap_or_default(), now.area]);
+            }
         }
-        range
-    }
-
-    /// Empties the picture.
-    fn clear(&mut self, camera: &Camera) {
-        let (size, width) = ([camera.width, camera.height], camera.width as usize);
-        if self.size == size && self.depth.len() == camera.pixels() {
-            for row in self.drawn.top..self.drawn.bottom {
-                let row = self.depth.get_mut(row * width + self.drawn.left..row * width + self.drawn.right);
+        let gone = self.shown.drain(solid.instances().len().min(self.shown.len())..);
+        self.dirty.extend(gone.map(|shown| shown.area));
+        self.dirty.retain(|area| area.pixels() > 0);
+        let Layers { dirty, depth, shown, slots, .. } = self;
+        for area in dirty {
+            for row in area.top..area.bottom {
+                let row = depth.get_mut(row * width + area.left..row * width + area.right);
                 row.unwrap_or_default().fill(f32::INFINITY);
             }
-        } else {
-            self.depth.clear();
-            self.depth.resize(camera.pixels(), f32::INFINITY);
-            self.size = size;
+            vectorised(
+                #[inline(always)]
+                || {
+                    for slot in shown.iter().filter_map(|shown| slots.get(shown.at)) {
+                        slot.layer.show(depth, width, area);
+                    }
+                },
+            );
         }
-        self.drawn = Area::default();
+        range
     }
 
     /// Draws a layer and says where it is: in the place of one whose mesh is gone, in a new place, or in that of the one
@@ -159,11 +198,13 @@ impl Layers {
         let oldest = || (0..self.slots.len()).min_by_key(|&i| self.slots[i].used);
         let at = gone.or_else(|| if self.slots.len() < SLOTS { None } else { oldest() }).unwrap_or(self.slots.len());
         if at == self.slots.len() {
-            self.slots.push(Slot { mesh: Weak::new(), affine, camera: eye, used: 0, layer: Layer::default() });
+            let (used, seen_at, made, layer) = (0, 0, (0, 0), Layer::default());
+            self.slots.push(Slot { mesh: Weak::new(), affine, camera: eye, used, seen_at, made, layer });
         }
         let slot = &mut self.slots[at];
         self.bytes -= slot.layer.bytes();
         (slot.mesh, slot.affine, slot.camera) = (Arc::downgrade(&instance.mesh), affine, eye);
+        (slot.made, slot.seen_at) = ((self.clock, at), 0);
         slot.layer.draw(instance, camera, (&mut self.projected, &mut self.candidates), &mut self.room);
         self.bytes += slot.layer.bytes();
         at
@@ -197,19 +238,23 @@ impl Layer {
         to_depth(camera, &mut self.depth);
         self.pieces.clear();
         trace_mesh(&instance.mesh, &placement, camera, &vertices, room, |piece, _| self.pieces.push(piece));
+        self.looks = Area::looked_at(&self.pieces, camera);
+        self.seen.clear();
     }
 
-    /// Puts what is nearer than the picture into it.
+    /// Puts what is nearer than the picture into it, in some area.
     #[inline(always)]
-    fn show(&self, picture: &mut [f32], width: usize) {
-        let columns = self.area.right - self.area.left;
-        if columns == 0 {
+    fn show(&self, picture: &mut [f32], width: usize, within: &Area) {
+        let area = self.area.common(within);
+        if area.pixels() == 0 {
             return;
         }
-        for (row, own) in (self.area.top..self.area.bottom).zip(self.depth.chunks_exact(columns)) {
-            let Some(there) = picture.get_mut(row * width + self.area.left..row * width + self.area.right) else {
-                return;
-            };
+        let columns = self.area.right - self.area.left;
+        for row in area.top..area.bottom {
+            let start = (row - self.area.top) * columns + area.left - self.area.left;
+            let own = self.depth.get(start..start + area.right - area.left);
+            let there = picture.get_mut(row * width + area.left..row * width + area.right);
+            let (Some(own), Some(there)) = (own, there) else { return };
             for (there, own) in there.iter_mut().zip(own) {
                 *there = if *own < *there { *own } else { *there };
             }
@@ -217,7 +262,26 @@ impl Layer {
     }
 
     fn bytes(&self) -> usize {
-        self.depth.capacity() * size_of::<f32>() + self.pieces.capacity() * size_of::<Piece>()
+        let numbers = self.depth.capacity() + 5 * self.seen.x.capacity();
+        numbers * size_of::<f32>() + self.pieces.capacity() * size_of::<Piece>()
+    }
+}
+
+impl Area {
+    /// A rectangle with all pixels that pieces look at.
+    fn looked_at(pieces: &[Piece], camera: &Camera) -> Area {
+        let ends = |side: u32, at: fn(&Piece) -> f32| {
+            let (low, high) = pieces
+                .iter()
+                .map(at)
+                .fold((f32::INFINITY, f32::NEG_INFINITY), |(low, high), v| (low.min(v), high.max(v)));
+            // What lies outside looks at the nearest pixel inside.
+            let (reach, last) = (BESIDE as f32 + 1.0, side as f32 - 1.0);
+            let index = |v: f32| v.max(0.0).min(last) as usize;
+            if pieces.is_empty() { (0, 0) } else { (index(low - reach), index(high + reach) + 1) }
+        };
+        let ((left, right), (top, bottom)) = (ends(camera.width, |p| p.x), ends(camera.height, |p| p.y));
+        Area { left, right, top, bottom }
     }
 }
 

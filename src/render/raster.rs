@@ -348,18 +348,18 @@ impl Area {
         Area { left, right, top, bottom }
     }
 
-    /// The smallest rectangle around two; one without pixels counts for nothing.
-    pub fn with(&self, other: &Area) -> Area {
-        match (self.pixels(), other.pixels()) {
-            (_, 0) => *self,
-            (0, _) => *other,
-            _ => Area {
-                left: self.left.min(other.left),
-                right: self.right.max(other.right),
-                top: self.top.min(other.top),
-                bottom: self.bottom.max(other.bottom),
-            },
-        }
+    /// What two have in common.
+    #[inline]
+    pub fn common(&self, other: &Area) -> Area {
+        let (left, top) = (self.left.max(other.left), self.top.max(other.top));
+        let (right, bottom) = (self.right.min(other.right).max(left), self.bottom.min(other.bottom).max(top));
+        Area { left, right, top, bottom }
+    }
+
+    /// Whether they have pixels in common.
+    #[inline]
+    pub fn meets(&self, other: &Area) -> bool {
+        self.common(other).pixels() > 0
     }
 
     /// Number of pixels.

@@ -6,7 +6,7 @@
 //! out when the piece is made, so a piece can be kept and looked at again when something else has moved.
 
 /// How far beside a piece to look, in pixels.
-const BESIDE: f64 = 1.2;
+pub(super) const BESIDE: f64 = 1.2;
 
 /// Depth tolerance as a share of the object's depth range.
 const TOLERANCE: f64 = 0.006;
