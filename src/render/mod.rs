@@ -17,7 +17,6 @@ mod project;
 mod pull;
 mod raster;
 mod shade;
-mod simd;
 mod surface;
 mod trace;
 mod triangle;
@@ -28,6 +27,8 @@ mod visibility;
 mod extremes_tests;
 #[cfg(test)]
 mod testing;
+
+use crate::num::simd;
 
 pub use camera::{Camera, CameraError, Projection};
 pub use contours::Contours;
