@@ -216,7 +216,7 @@ mod tests {
             .collect();
         let squares = |centres: &[[f32; 3]]| {
             let mut labels = vec![0; points.len()];
-            label(&points, centres, &mut labels);
+            label(&planes(&points), centres, &mut labels);
             let d = |p: &[f32; 3], l: &u8| (0..3).map(|c| (p[c] - centres[*l as usize][c]).powi(2)).sum::<f32>();
             points.iter().zip(&labels).map(|(p, l)| f64::from(d(p, l))).sum::<f64>()
         };
