@@ -126,7 +126,7 @@ mod tests {
 
     #[test]
     fn many_colours_are_as_one_by_one() {
-        let value = |i: u32| linear_table()[(i % 256) as usize] * if i % 7 == 0 { 0.37 } else { 1.0 };
+        let value = |i: u32| linear_table()[(i % 256) as usize] * if i.is_multiple_of(7) { 0.37 } else { 1.0 };
         let mut colours: Vec<[f32; 3]> = (0..60_000u32).map(|i| [value(i), value(i / 3), value(i * 31 / 5)]).collect();
         colours.extend((0..256).map(|i| [value(i); 3]));
         colours.extend([[0.0; 3], [1.0, 0.0, 0.0], [4.0, 9.0, 1e3], [f32::NAN, 0.5, 0.5], [-1.0, 0.2, f32::INFINITY]]);
