@@ -6,6 +6,7 @@ mod exact;
 mod hash;
 mod incomplete;
 mod saddle;
+pub(crate) mod simd;
 mod special;
 mod tails;
 

@@ -21,7 +21,6 @@ mod pull;
 mod raster;
 mod shade;
 mod silhouette;
-mod simd;
 mod surface;
 mod trace;
 mod triangle;
@@ -32,6 +31,8 @@ mod visibility;
 mod extremes_tests;
 #[cfg(test)]
 mod testing;
+
+use crate::num::simd;
 
 pub use batch::{BatchRenderer, ContourBatch, ContourSlice, Cores, Scene};
 pub use camera::{Camera, CameraError, Projection};

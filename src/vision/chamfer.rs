@@ -10,8 +10,9 @@ mod reverse;
 use self::reverse::Reverse;
 use super::contour_map::ContourMap;
 use super::elements::{ComparatorError, Element, Elements, check};
-use super::field::{CHANNELS, Edges, PER_RADIAN, channels_of, turn_between};
+use super::field::{CHANNELS, Edges, PER_RADIAN, channels_of, side_by_side, turn_between};
 use crate::num::LN_SQRT_2PI;
+use crate::num::simd::vectorised;
 
 pub use self::reverse::Scratch;
 
@@ -206,18 +207,36 @@ fn fields(grid: &Edges, oriented: Option<f64>) -> Vec<Vec<f32>> {
         return vec![grid.nearest(|_| true).map_or_else(|| vec![NOTHING as f32; samples], |n| n.distance)];
     };
     let per_channel = (cost * std::f64::consts::PI / CHANNELS as f64) as f32;
+    // Distance and orientation of every channel's nearest edges, of those channels that have edges.
+    let mut nearest: [Option<(Vec<f32>, Vec<f32>)>; CHANNELS] = Default::default();
+    side_by_side(&mut nearest, |k, out| {
+        let found = grid.nearest(|e| e.turn.round() as usize % CHANNELS == k);
+        *out = found.map(|n| (n.distance, n.edge.iter().map(|&id| grid.edges[id as usize].turn).collect()));
+    });
     let mut fields = vec![vec![NOTHING as f32; samples]; CHANNELS];
-    for k in 0..CHANNELS {
-        let Some(nearest) = grid.nearest(|e| e.turn.round() as usize % CHANNELS == k) else { continue };
-        for (i, (&d, &id)) in nearest.distance.iter().zip(&nearest.edge).enumerate() {
-            for (j, field) in fields.iter_mut().enumerate() {
-                let turn = turn_between(grid.edges[id as usize].turn, j as f32);
-                field[i] = field[i].min(d + per_channel * turn);
+    side_by_side(&mut fields, |j, field| {
+        // In pieces that stay in the cache for all channels.
+        for (n, field) in field.chunks_mut(PIECE).enumerate() {
+            for (distance, turns) in nearest.iter().flatten() {
+                let of = n * PIECE..n * PIECE + field.len();
+                let edges = distance[of.clone()].iter().zip(&turns[of]);
+                vectorised(
+                    #[inline(always)]
+                    || {
+                        for (least, (&d, &turn)) in field.iter_mut().zip(edges) {
+                            let cost = d + per_channel * turn_between(turn, j as f32);
+                            *least = if cost < *least { cost } else { *least };
+                        }
+                    },
+                );
             }
         }
-    }
+    });
     fields
 }
+
+/// Samples of a piece.
+const PIECE: usize = 2048;
 
 #[cfg(test)]
 mod tests;

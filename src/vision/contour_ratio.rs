@@ -11,12 +11,13 @@
 mod background;
 mod credit;
 mod gradient;
+mod ratio;
 
 use self::background::scores;
 use self::credit::{Capacity, NO_GROUP};
 use super::contour_map::ContourMap;
 use super::elements::{ComparatorError, Elements, check};
-use super::field::{CHANNELS, Edges, channels_of};
+use super::field::{CHANNELS, Edge, Edges, channels_of, side_by_side, turn_between};
 
 pub use self::credit::Scratch;
 
@@ -118,15 +119,16 @@ impl ContourRatio {
         let capacity = Capacity::new(&grid, frame_pixel, options.credit);
         let none = Cell { score: libm::log(1.0 - options.foreground) as f32, group: NO_GROUP };
         let mut cells = vec![none; samples * CHANNELS];
-        for (k, out) in cells.chunks_exact_mut(samples).enumerate() {
+        side_by_side(cells.chunks_exact_mut(samples), |k, out| {
             // A channel holds the edges within one channel's width: an element between two channels finds an edge of its own
             // orientation in both.
-            let Some(nearest) = grid.nearest(|e| super::field::turn_between(e.turn, k as f32) <= 1.0) else { continue };
+            let near = |e: &Edge| turn_between(e.turn, k as f32) <= 1.0;
+            let Some(nearest) = grid.nearest_within(options.truncate, near) else { return };
             let scores = scores(&grid, &nearest.distance, options);
             for ((cell, score), &edge) in out.iter_mut().zip(scores).zip(&nearest.edge) {
                 *cell = Cell { score, group: if score > 0.0 { capacity.group(edge) } else { NO_GROUP } };
             }
-        }
+        });
         let percent = 100.0 / super::elements::diagonal(width, height);
         Ok(ContourRatio { options: options.clone(), grid, cells, capacity, percent })
     }

@@ -1,6 +1,6 @@
 //! Contour detectors. One is built in, from gradients; others (a trained network, a file) can take its place behind the trait.
 
-use super::color::linear_to_lab;
+use super::color::linear_to_labs;
 use super::contour_map::ContourMap;
 use super::gradient::colour_gradient;
 use super::nms::{EdgePoint, hysteresis, suppress};
@@ -45,7 +45,8 @@ const COLOUR_WEIGHT: f32 = 2.0;
 impl ContourDetector for GradientDetector {
     fn detect(&self, photo: &Photo) -> ContourMap {
         let (width, height) = fitted(photo.width(), photo.height(), self.size);
-        let lab: Vec<[f32; 3]> = photo.linear(width, height).rgb.into_iter().map(weighted_lab).collect();
+        let mut lab = linear_to_labs(&photo.linear(width, height).rgb);
+        lab.iter_mut().for_each(|[_, a, b]| (*a, *b) = (COLOUR_WEIGHT * *a, COLOUR_WEIGHT * *b));
         let gradient = colour_gradient(width, height, &lab, self.sigma);
         let points = suppress(&gradient, FLOOR);
         let reference = (quantile(&points, REFERENCE_QUANTILE) * COMMON_REFERENCE).sqrt();
@@ -54,18 +55,11 @@ impl ContourDetector for GradientDetector {
     }
 }
 
-/// L*, a*, b* with the weight of colour.
-fn weighted_lab(linear: [f32; 3]) -> [f32; 3] {
-    let [l, a, b] = linear_to_lab(linear);
-    [l, COLOUR_WEIGHT * a, COLOUR_WEIGHT * b]
-}
-
 /// The magnitude below which the given part of the points lie; 1 without points.
 fn quantile(points: &[EdgePoint], part: f64) -> f32 {
-    let mut sorted: Vec<f32> = points.iter().map(|p| p.magnitude).collect();
-    sorted.sort_by(f32::total_cmp);
-    let at = (part * sorted.len().saturating_sub(1) as f64) as usize;
-    sorted.get(at).copied().unwrap_or(1.0)
+    let mut magnitudes: Vec<f32> = points.iter().map(|p| p.magnitude).collect();
+    let at = (part * magnitudes.len().saturating_sub(1) as f64) as usize;
+    if magnitudes.is_empty() { 1.0 } else { *magnitudes.select_nth_unstable_by(at, f32::total_cmp).1 }
 }
 
 #[cfg(test)]

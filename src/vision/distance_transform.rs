@@ -1,6 +1,9 @@
 //! The exact Euclidean distance transform: for every pixel the distance to the nearest set pixel, and which one that is.
 //! Felzenszwalb & Huttenlocher 2012, "Distance transforms of sampled functions", Theory of Computing 8, 415-428: lower envelopes
-//! of parabolas, rows after columns, linear time. Distances are between pixel centres, in pixels, exact up to one rounding.
+//! of parabolas, rows after columns, linear time. Distances are between pixel centres, in pixels, exact up to one rounding. Of
+//! several set pixels as near, the leftmost counts, and of those in one column the upper.
+
+use crate::num::simd::vectorised;
 
 /// Distances to the nearest set pixel of a map.
 #[derive(Clone, Debug, Default, PartialEq)]
@@ -15,104 +18,155 @@ pub struct DistanceMap {
     pub nearest: Vec<u32>,
 }
 
-const NONE: u32 = u32::MAX;
+/// Signed rows to a column without set pixels: farther than any row is.
+const NOWHERE: i32 = i32::MAX / 2;
 
-/// Scratch of one line's lower envelope.
-struct Envelope {
-    /// Places of the parabolas, from the left.
-    place: Vec<usize>,
-    /// From where on each is the lowest.
-    from: Vec<f64>,
+/// For every pixel the nearest set pixel of its own column, as the number of rows down to it; of two as near the upper one.
+pub(super) struct Columns {
+    width: usize,
+    away: Vec<i32>,
 }
 
-impl Envelope {
-    fn new(n: usize) -> Self {
-        Envelope { place: Vec::with_capacity(n), from: Vec::with_capacity(n) }
+/// Memory for one row after the other: the parabolas `(x - q)^2 + f(q)` of its lower envelope, from the left. Between columns they
+/// differ by the lines `h - 2 x q` with `h = q^2 + f(q)`.
+#[derive(Default)]
+pub(super) struct Envelope {
+    q: Vec<f64>,
+    h: Vec<f64>,
+}
+
+impl Columns {
+    /// The columns of a map of `width` x `height` pixels, at least one; pixels beyond the end of `set` are not set.
+    pub fn of(width: usize, height: usize, set: &[bool]) -> Self {
+        let mut away = vec![0i32; width * height];
+        let (mut above, mut below) = (vec![-NOWHERE; width], vec![NOWHERE; width]);
+        let none = vec![false; width];
+        let row = |y: usize| set.get(y * width..(y + 1) * width);
+        let last: Vec<bool> = set.iter().skip(set.len() / width * width).copied().chain(none).take(width).collect();
+        let at = |y: usize| row(y).unwrap_or(if y == set.len() / width { &last } else { &[] });
+        vectorised(
+            #[inline(always)]
+            || {
+                for (y, out) in away.chunks_exact_mut(width).enumerate() {
+                    above.iter_mut().for_each(|a| *a -= 1);
+                    above.iter_mut().zip(at(y)).for_each(|(a, &s)| *a = if s { 0 } else { *a });
+                    out.copy_from_slice(&above);
+                }
+                for (y, out) in away.chunks_exact_mut(width).enumerate().rev() {
+                    below.iter_mut().for_each(|b| *b += 1);
+                    below.iter_mut().zip(at(y)).for_each(|(b, &s)| *b = if s { 0 } else { *b });
+                    out.iter_mut().zip(&below).for_each(|(o, &b)| *o = if b < -*o { b } else { *o });
+                }
+            },
+        );
+        Columns { width, away }
     }
 
-    /// The envelope of the parabolas `(x - q)^2 + f(q)` over the `q` where `f` is finite.
-    fn build(&mut self, f: &[f64]) {
-        self.place.clear();
-        self.from.clear();
-        for (q, &fq) in f.iter().enumerate().filter(|(_, v)| v.is_finite()) {
-            let mut start = f64::NEG_INFINITY;
-            while let (Some(&p), Some(&z)) = (self.place.last(), self.from.last()) {
-                let (a, b) = (q as f64, p as f64);
-                // p < q; values are squares of integers, exact in f64.
-                start = ((fq + a * a) - (f[p] + b * b)) / (2.0 * (a - b));
-                if start > z {
-                    break;
+    /// Tells `each` the nearest set pixel (column, rows down to it) of every pixel of a row, from the left; of two as near the left
+    /// one. It is not called where no pixel of the map is set.
+    ///
+    /// Parabolas on the lower envelope are corners of the lower convex hull of the points `(q, h)`, so no place where two meet has
+    /// to be worked out: all comparisons are of whole numbers, exact in f64 for sides up to 2^17.
+    pub fn nearest(&self, y: usize, envelope: &mut Envelope, mut each: impl FnMut(Option<(usize, i32)>)) {
+        let Some(away) = self.away.get(y * self.width..(y + 1) * self.width) else { return };
+        let Envelope { q, h } = envelope;
+        // The last two are kept at hand.
+        let (mut before, mut last) = ((0.0, 0.0), (0.0, 0.0));
+        q.clear();
+        h.clear();
+        for (column, &a) in away.iter().enumerate().filter(|(_, a)| a.abs() < NOWHERE) {
+            let (x, f) = (column as f64, f64::from(a));
+            let new = (x, x * x + f * f);
+            while q.len() > 1 && (last.1 - before.1) * (new.0 - last.0) >= (new.1 - last.1) * (last.0 - before.0) {
+                q.pop();
+                h.pop();
+                last = before;
+                if let ([.., q, _], [.., h, _]) = (&q[..], &h[..]) {
+                    before = (*q, *h);
                 }
-                self.place.pop();
-                self.from.pop();
-                start = f64::NEG_INFINITY;
             }
-            self.place.push(q);
-            self.from.push(start);
+            q.push(new.0);
+            h.push(new.1);
+            (before, last) = (last, new);
+        }
+        let mut lowest = 0;
+        for x in 0..self.width {
+            let twice = 2.0 * x as f64;
+            while let ([p, o, ..], [a, b, ..]) = (&q[lowest..], &h[lowest..])
+                && b - a < twice * (o - p)
+            {
+                lowest += 1;
+            }
+            let Some(&column) = q.get(lowest) else { return };
+            let column = column as u32 as usize;
+            each(Some((column, away[column])));
         }
     }
 
-    /// The lowest parabola of every place, in order; nothing for an empty envelope.
-    fn walk(&self, n: usize) -> impl Iterator<Item = usize> + '_ {
-        let mut k = 0;
-        (0..if self.place.is_empty() { 0 } else { n }).map(move |x| {
-            while self.from.get(k + 1).is_some_and(|&z| z < x as f64) {
-                k += 1;
+    /// As [`Columns::nearest`] with `None` for pixels from which no set pixel is within `reach`, at most [`FARTHEST`]. Much faster
+    /// where set pixels are dense or `reach` is small: columns are looked at from near to far, those of many pixels side by side.
+    pub fn within(&self, y: usize, reach: usize, row: &mut Vec<i32>, mut each: impl FnMut(Option<(usize, i32)>)) {
+        let Some(away) = self.away.get(y * self.width..(y + 1) * self.width) else { return };
+        // Squared distances, and below them where it is measured to: the least is the nearest, of several the leftmost.
+        let most = reach as i32;
+        let bits = (2 * most + 1).ilog2() + 1;
+        row.clear();
+        row.resize(reach, NOWHERE);
+        row.extend(away.iter().map(|&a| if a.abs() <= most { (a * a) << bits } else { NOWHERE }));
+        row.resize(self.width.next_multiple_of(SPAN) + 2 * reach, NOWHERE);
+        for start in (0..self.width).step_by(SPAN) {
+            let mut least = [NOWHERE; SPAN];
+            vectorised(
+                #[inline(always)]
+                || {
+                    for dx in 0..=most {
+                        for place in [most - dx, most + dx] {
+                            let more = ((dx * dx) << bits) + place;
+                            let there = &row[start + place as usize..][..SPAN];
+                            for (l, t) in least.iter_mut().zip(there) {
+                                let d = t + more;
+                                *l = if d < *l { d } else { *l };
+                            }
+                        }
+                        let worst = least.iter().fold(0, |a, &b| if b > a { b } else { a });
+                        if (dx + 1) * (dx + 1) > worst >> bits {
+                            break;
+                        }
+                    }
+                },
+            );
+            for (x, l) in (start..self.width).zip(least) {
+                let column = x + (l & ((1 << bits) - 1)) as usize;
+                let found = l >> bits <= most * most;
+                each(found.then(|| (column - reach, away[column - reach])));
             }
-            self.place[k]
-        })
+        }
     }
 }
+
+/// The largest reach of [`Columns::within`], pixels: twice its square and its double fit into an `i32`.
+pub(super) const FARTHEST: usize = 500;
+
+/// Pixels that are worked on side by side.
+const SPAN: usize = 64;
 
 /// The distance transform of a map of `width` x `height` pixels; pixels beyond the end of `set` are not set. When no pixel is
 /// set, all distances are the diagonal and all `nearest` are `u32::MAX`.
 pub fn distance_transform(width: u32, height: u32, set: &[bool]) -> DistanceMap {
     let (w, h) = (width as usize, height as usize);
-    let mut nearest = vec![NONE; w * h];
-    let mut values = vec![libm::hypot(f64::from(width), f64::from(height)) as f32; w * h];
     if w * h == 0 || !set.iter().take(w * h).any(|&s| s) {
-        return DistanceMap { width, height, values, nearest };
+        let diagonal = libm::hypot(f64::from(width), f64::from(height)) as f32;
+        return DistanceMap { width, height, values: vec![diagonal; w * h], nearest: vec![u32::MAX; w * h] };
     }
-    // Columns: the distance to the nearest set pixel above or below, squared, and its row.
-    let mut squared = vec![f64::INFINITY; w * h];
-    let is_set = |i: usize| set.get(i).copied().unwrap_or(false);
-    for x in 0..w {
-        let mut last = None;
-        for y in 0..h {
-            if is_set(y * w + x) {
-                last = Some(y);
-            }
-            if let Some(row) = last {
-                squared[y * w + x] = ((y - row) * (y - row)) as f64;
-                nearest[y * w + x] = (row * w + x) as u32;
-            }
-        }
-        last = None;
-        for y in (0..h).rev() {
-            if is_set(y * w + x) {
-                last = Some(y);
-            }
-            if let Some(row) = last {
-                let d = ((row - y) * (row - y)) as f64;
-                if d < squared[y * w + x] {
-                    squared[y * w + x] = d;
-                    nearest[y * w + x] = (row * w + x) as u32;
-                }
-            }
-        }
-    }
-    // Rows: the lower envelope over columns.
-    let mut envelope = Envelope::new(w);
-    let mut row_nearest = vec![NONE; w];
+    let (mut values, mut nearest) = (Vec::with_capacity(w * h), Vec::with_capacity(w * h));
+    let (columns, mut envelope) = (Columns::of(w, h, set), Envelope::default());
     for y in 0..h {
-        let row = y * w..(y + 1) * w;
-        envelope.build(&squared[row.clone()]);
-        row_nearest.copy_from_slice(&nearest[row.clone()]);
-        for (x, q) in envelope.walk(w).enumerate() {
-            let d = x.abs_diff(q);
-            values[y * w + x] = (squared[y * w + q] + (d * d) as f64).sqrt() as f32;
-            nearest[y * w + x] = row_nearest[q];
-        }
+        columns.nearest(y, &mut envelope, |found| {
+            let Some((column, down)) = found else { return };
+            let (dx, dy) = (column as f64 - (nearest.len() - y * w) as f64, f64::from(down));
+            values.push((dx * dx + dy * dy).sqrt() as f32);
+            nearest.push(((y as i64 + i64::from(down)) as usize * w + column) as u32);
+        });
     }
     DistanceMap { width, height, values, nearest }
 }
@@ -188,6 +242,36 @@ mod tests {
                 }
             }
         }
+    }
+
+    #[test]
+    fn near_pixels_are_found_within_reach() {
+        for (seed, (w, h)) in (0..).zip([(1, 1), (1, 17), (70, 3), (64, 20), (150, 33)]) {
+            for (density, reach) in [(0.002, 0), (0.01, 5), (0.2, 3), (0.01, 40), (0.5, FARTHEST)] {
+                let set = random(w, h, density, seed);
+                let (columns, mut envelope, mut line) = (Columns::of(w, h, &set), Envelope::default(), Vec::new());
+                for y in 0..h {
+                    let (mut all, mut near) = (Vec::new(), Vec::new());
+                    columns.nearest(y, &mut envelope, |found| all.push(found));
+                    columns.within(y, reach, &mut line, |found| near.push(found));
+                    all.resize(w, None);
+                    let square =
+                        |x: usize, (column, down): (usize, i32)| column.abs_diff(x).pow(2) as i32 + down * down;
+                    for (x, found) in all.iter_mut().enumerate() {
+                        *found = found.filter(|f| square(x, *f) <= (reach * reach) as i32);
+                    }
+                    assert_eq!(all, near, "{w} x {h}, {density}, within {reach}, row {y}");
+                }
+            }
+        }
+    }
+
+    #[test]
+    fn of_pixels_as_near_the_leftmost_and_uppermost_counts() {
+        let set: Vec<bool> = (0..25).map(|i| [2, 10, 14, 22].contains(&i)).collect();
+        let map = distance_transform(5, 5, &set);
+        assert_eq!((map.nearest[12], map.nearest[7], map.nearest[13]), (10, 2, 14));
+        assert_eq!(distance_transform(1, 3, &[true, false, true]).nearest, [0, 0, 2]);
     }
 
     #[test]

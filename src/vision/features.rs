@@ -67,9 +67,23 @@ pub fn observed(m: &ContourMap) -> Vec<Stroke> {
 /// together weighed as one number; then the square roots of the shares of the length in each cell and orientation, whose squares
 /// sum to 1 where there are contours.
 pub fn contour_features(strokes: &[Stroke]) -> Vec<f32> {
+    features_of(strokes, &turns(strokes))
+}
+
+/// The features, given the orientations.
+fn features_of(strokes: &[Stroke], turns: &[f32]) -> Vec<f32> {
     let mut features = pooled_distances(strokes);
-    features.extend(histograms(strokes));
+    features.extend(histograms(strokes, turns));
     features
+}
+
+/// The orientation of every piece, in those of the histograms.
+fn turns(strokes: &[Stroke]) -> Vec<f32> {
+    let turn = |s: &Stroke| {
+        let angle = libm::atan2f(s.along[1], s.along[0]) / std::f32::consts::PI;
+        (angle - angle.floor()) * ORIENTATIONS as f32
+    };
+    strokes.iter().map(turn).collect()
 }
 
 fn pooled_distances(strokes: &[Stroke]) -> Vec<f32> {
@@ -91,11 +105,10 @@ fn pooled_distances(strokes: &[Stroke]) -> Vec<f32> {
 }
 
 /// Length by cell and orientation, each piece shared between the nearest cells and orientations.
-fn histograms(strokes: &[Stroke]) -> Vec<f32> {
+fn histograms(strokes: &[Stroke], turns: &[f32]) -> Vec<f32> {
     let mut lengths = vec![0.0f32; CELLS * CELLS * ORIENTATIONS];
-    for s in strokes.iter().filter(|s| (s.at[0] + s.at[1] + s.along[0] + s.along[1] + s.length).is_finite()) {
-        let angle = libm::atan2f(s.along[1], s.along[0]) / std::f32::consts::PI;
-        let turn = (angle - angle.floor()) * ORIENTATIONS as f32;
+    let sound = |s: &Stroke| (s.at[0] + s.at[1] + s.along[0] + s.along[1] + s.length).is_finite();
+    for (s, &turn) in strokes.iter().zip(turns).filter(|(s, _)| sound(s)) {
         let [x, y] = s.at.map(|v| (v + 0.5) * CELLS as f32 - 0.5);
         for (column, wx) in split(x) {
             for (row, wy) in split(y) {
@@ -149,9 +162,10 @@ impl Query {
     /// Contours, compared also after small shifts (a twentieth of the longer side) and changes of size (a tenth): a scene of
     /// the right shape should be found though it is not quite in the right place.
     pub fn contours(strokes: &[Stroke]) -> Query {
+        let turns = turns(strokes);
         let moved = |(dx, dy, scale): (f32, f32, f32)| {
             let to = |s: &Stroke| Stroke { at: [s.at[0] * scale + dx, s.at[1] * scale + dy], ..*s };
-            contour_features(&strokes.iter().map(to).collect::<Vec<_>>())
+            features_of(&strokes.iter().map(to).collect::<Vec<_>>(), &turns)
         };
         Query { variants: movements().map(moved).collect(), weights: vec![1.0; CONTOUR_FEATURES] }
     }

@@ -3,7 +3,6 @@
 //! Not a detector, and no likelihood. Invariant: every sample is finite, within 0..=100, and reading is continuous.
 
 use super::contour_map::ContourMap;
-use super::distance_transform::distance_transform;
 use super::elements::{ComparatorError, check_size, diagonal};
 
 /// Least number of samples on the longer side of a field. At 256, reading |d| bilinearly is wrong by 0.1 % of the diagonal
@@ -35,9 +34,13 @@ pub(super) struct Edge {
 
 impl Edge {
     /// Distance from a point to the piece, in grid units.
+    #[inline(always)]
     pub fn distance(&self, x: f32, y: f32) -> f32 {
         let (dx, dy) = (x - self.x, y - self.y);
-        let along = (dx * self.tx + dy * self.ty).clamp(-self.half, self.half);
+        let along = dx * self.tx + dy * self.ty;
+        // A clamp, written so that several are worked out at a time.
+        let along = if along < -self.half { -self.half } else { along };
+        let along = if along > self.half { self.half } else { along };
         let (ex, ey) = (dx - along * self.tx, dy - along * self.ty);
         (ex * ex + ey * ey).sqrt()
     }
@@ -92,42 +95,6 @@ impl Edges {
         Ok(Edges { width: gw, height: gh, sx: gw as f32 / width as f32, sy: gh as f32 / height as f32, percent, edges })
     }
 
-    /// For each grid pixel the nearest of the chosen edges and the distance in percent of the diagonal; `None` where there
-    /// are no such edges. The candidates are the transform's nearest edges of the pixel and its eight neighbours.
-    pub fn nearest(&self, chosen: impl Fn(&Edge) -> bool) -> Option<Nearest> {
-        let (w, h) = (self.width as usize, self.height as usize);
-        let mut first = vec![u32::MAX; w * h];
-        for (i, e) in self.edges.iter().enumerate().rev().filter(|(_, e)| chosen(e)) {
-            first[(e.y as usize).min(h - 1) * w + (e.x as usize).min(w - 1)] = i as u32;
-        }
-        let set: Vec<bool> = first.iter().map(|&i| i != u32::MAX).collect();
-        if !set.contains(&true) {
-            return None;
-        }
-        let map = distance_transform(self.width, self.height, &set);
-        let mut out = Nearest { distance: Vec::with_capacity(w * h), edge: Vec::with_capacity(w * h) };
-        for y in 0..h {
-            for x in 0..w {
-                let (px, py) = (x as f32 + 0.5, y as f32 + 0.5);
-                let mut best = (f32::INFINITY, u32::MAX);
-                for v in y.saturating_sub(1)..(y + 2).min(h) {
-                    for u in x.saturating_sub(1)..(x + 2).min(w) {
-                        let edge = map.nearest.get(v * w + u).and_then(|&p| first.get(p as usize));
-                        if let Some((&id, e)) = edge.and_then(|id| Some((id, self.edges.get(*id as usize)?))) {
-                            let d = e.distance(px, py);
-                            if d < best.0 || (d == best.0 && id < best.1) {
-                                best = (d, id);
-                            }
-                        }
-                    }
-                }
-                out.distance.push((best.0 * self.percent).min(100.0));
-                out.edge.push(best.1);
-            }
-        }
-        Some(out)
-    }
-
     /// Where a point of the frame lies between the grid's samples.
     #[inline]
     pub fn corners(&self, x: f32, y: f32) -> Corners {
@@ -138,15 +105,6 @@ impl Edges {
         let (x1, y1) = ((x0 + 1).min(w - 1), (y0 + 1).min(h - 1));
         Corners { at: [y0 * w + x0, y0 * w + x1, y1 * w + x0, y1 * w + x1], fx: gx - x0 as f32, fy: gy - y0 as f32 }
     }
-}
-
-/// Nearest edges of a grid's pixels.
-#[derive(Debug, Clone)]
-pub(super) struct Nearest {
-    /// Distance in percent of the diagonal.
-    pub distance: Vec<f32>,
-    /// Index into [`Edges::edges`].
-    pub edge: Vec<u32>,
 }
 
 /// The four samples round a point and the fractions between them.
@@ -186,9 +144,11 @@ pub(super) fn channel(tx: f32, ty: f32) -> f32 {
 }
 
 /// The smaller difference of two orientations in channels, 0..=4.
+#[inline(always)]
 pub(super) fn turn_between(a: f32, b: f32) -> f32 {
     let d = (a - b).abs();
-    d.min(CHANNELS as f32 - d)
+    let other = CHANNELS as f32 - d;
+    if other < d { other } else { d }
 }
 
 /// The two channels next to a tangent's orientation and the weight of the second.
@@ -197,4 +157,15 @@ pub(super) fn channels_of(tx: f32, ty: f32) -> (usize, usize, f32) {
     let k = channel(tx, ty);
     let low = (k as usize).min(CHANNELS - 1);
     (low, (low + 1) % CHANNELS, k - low as f32)
+}
+
+/// Does `work` for every part, each on a thread of its own, and waits for all. Not rayon's threads: whoever waits here may hold a lock
+/// that a task of theirs, which they would take up meanwhile, waits for.
+pub(super) fn side_by_side<T: Send>(parts: impl IntoIterator<Item = T>, work: impl Fn(usize, T) + Sync) {
+    let work = &work;
+    std::thread::scope(|scope| {
+        for (i, part) in parts.into_iter().enumerate() {
+            scope.spawn(move || work(i, part));
+        }
+    });
 }

@@ -1,6 +1,8 @@
 //! The gradient of a colour picture: smoothing and differentiation by Gaussians, and the structure tensor over the channels
 //! (Di Zenzo 1986, "A note on the gradient of a multi-image", CVGIP 33, 116-125). Beyond the border the picture is mirrored.
 
+use crate::num::simd::vectorised;
+
 /// Gradient magnitude and direction of every pixel, row by row.
 #[derive(Clone, Debug)]
 pub struct Gradient {
@@ -10,8 +12,16 @@ pub struct Gradient {
     pub height: u32,
     /// Root of the tensor's larger eigenvalue: change per pixel, at least 0.
     pub magnitude: Vec<f32>,
-    /// The direction of most change as a unit vector (its sign means nothing).
-    pub normal: Vec<[f32; 2]>,
+    /// The structure tensor, `[xx, xy, yy]`: squares of change per pixel, added up over the channels.
+    pub tensor: Vec<[f32; 3]>,
+}
+
+impl Gradient {
+    /// The direction of most change as a unit vector (its sign means nothing). Worked out when it is asked for, which is at few
+    /// pixels; there is none beyond the picture, where it is to the right.
+    pub fn normal(&self, pixel: usize) -> [f32; 2] {
+        self.tensor.get(pixel).map_or([1.0, 0.0], |&[a, b, c]| principal(a, b, c).1)
+    }
 }
 
 /// Samples of a Gaussian at `-r..=r`, sum 1, and of its derivative, exact on straight ramps; `r` is three standard deviations.
@@ -33,51 +43,95 @@ fn mirrored(i: i64, n: i64) -> usize {
     (if m < n { m } else { 2 * n - 1 - m }) as usize
 }
 
-/// A row filter then a column filter, both of odd length.
-fn filter(width: u32, height: u32, data: &[f32], along_x: &[f64], along_y: &[f64]) -> Vec<f32> {
-    let (w, h) = (width as usize, height as usize);
-    let line = |n: usize, kernel: &[f64], at: &dyn Fn(usize) -> f32, i: usize| -> f32 {
-        let r = (kernel.len() / 2) as i64;
-        let inside = i as i64 >= r && (i as i64) + r < n as i64;
-        let place = |k: usize| match inside {
-            true => i + k - r as usize,
-            false => mirrored(i as i64 + k as i64 - r, n as i64),
-        };
-        kernel.iter().enumerate().map(|(k, c)| c * f64::from(at(place(k)))).sum::<f64>() as f32
-    };
-    let mut rows = vec![0.0f32; w * h];
-    for (row, out) in data.chunks_exact(w.max(1)).zip(rows.chunks_exact_mut(w.max(1))) {
-        for (i, o) in out.iter_mut().enumerate() {
-            *o = line(w, along_x, &|k| row[k], i);
+/// Values that a filter works on side by side.
+const LANES: usize = 16;
+
+/// Sums `line[i + k] * kernel[k]` over k into `out[i]`, in the order of k and in double precision. `line` has room for a kernel and
+/// for whole lanes beyond `out`.
+#[inline(always)]
+fn convolve(line: &[f64], kernel: &[f64], out: &mut [f32]) {
+    for (n, out) in out.chunks_mut(LANES).enumerate() {
+        let mut sums = [0.0f64; LANES];
+        for (window, c) in line[n * LANES..].windows(LANES).zip(kernel) {
+            sums.iter_mut().zip(window).for_each(|(s, v)| *s += c * v);
         }
+        out.iter_mut().zip(sums).for_each(|(o, s)| *o = s as f32);
     }
-    let mut out = vec![0.0f32; w * h];
-    for j in 0..h {
-        for i in 0..w {
-            out[j * w + i] = line(h, along_y, &|k| rows[k * w + i], j);
-        }
-    }
+}
+
+/// Rows filtered by a kernel of odd length.
+fn along_rows(width: usize, data: &[f32], kernel: &[f64]) -> Vec<f32> {
+    let reach = kernel.len() / 2;
+    let source: Vec<usize> = (0..width + 2 * reach).map(|i| mirrored(i as i64 - reach as i64, width as i64)).collect();
+    let mut line = vec![0.0f64; source.len() + LANES];
+    let mut out = vec![0.0f32; data.len()];
+    vectorised(
+        #[inline(always)]
+        || {
+            for (row, out) in data.chunks_exact(width).zip(out.chunks_exact_mut(width)) {
+                line[reach..reach + width].iter_mut().zip(row).for_each(|(l, v)| *l = f64::from(*v));
+                for i in (0..reach).chain(reach + width..source.len()) {
+                    line[i] = f64::from(row[source[i]]);
+                }
+                convolve(&line, kernel, out);
+            }
+        },
+    );
     out
+}
+
+/// Columns filtered by a kernel of odd length.
+fn along_columns(width: usize, data: &[f32], kernel: &[f64]) -> Vec<f32> {
+    let (height, reach) = (data.len() / width, (kernel.len() / 2) as i64);
+    let mut out = vec![0.0f32; data.len()];
+    let mut sums = vec![0.0f64; width];
+    vectorised(
+        #[inline(always)]
+        || {
+            for (j, out) in out.chunks_exact_mut(width).enumerate() {
+                sums.fill(0.0);
+                for (c, k) in kernel.iter().zip(-reach..) {
+                    let row = mirrored(j as i64 + k, height as i64) * width;
+                    let row = &data[row..row + width];
+                    sums.iter_mut().zip(row).for_each(|(s, v)| *s += c * f64::from(*v));
+                }
+                out.iter_mut().zip(&sums).for_each(|(o, s)| *o = *s as f32);
+            }
+        },
+    );
+    out
+}
+
+/// The picture's part of a channel; nothing of a picture without pixels.
+fn pixels(width: u32, height: u32, data: &[f32]) -> &[f32] {
+    &data[..width as usize * height as usize]
 }
 
 /// A channel (at least `width * height` values) smoothed by a Gaussian of `sigma` pixels.
 pub fn smoothed(width: u32, height: u32, data: &[f32], sigma: f32) -> Vec<f32> {
     let (smooth, _) = kernels(sigma);
-    filter(width, height, data, &smooth, &smooth)
+    let w = (width as usize).max(1);
+    along_columns(w, &along_rows(w, pixels(width, height, data), &smooth), &smooth)
 }
 
 /// Derivatives along x and y of a channel smoothed by a Gaussian of `sigma` pixels.
 pub fn derivatives(width: u32, height: u32, data: &[f32], sigma: f32) -> (Vec<f32>, Vec<f32>) {
     let (smooth, slope) = kernels(sigma);
-    (filter(width, height, data, &slope, &smooth), filter(width, height, data, &smooth, &slope))
+    let (w, data) = ((width as usize).max(1), pixels(width, height, data));
+    let filter = |x: &[f64], y: &[f64]| along_columns(w, &along_rows(w, data, x), y);
+    (filter(&slope, &smooth), filter(&smooth, &slope))
 }
 
 /// Larger eigenvalue and its unit eigenvector of the symmetric matrix `[[a, b], [b, c]]`.
 pub fn principal(a: f32, b: f32, c: f32) -> (f32, [f32; 2]) {
+    let angle = 0.5 * libm::atan2(2.0 * f64::from(b), f64::from(a) - f64::from(c));
+    (most(a, b, c), [libm::cos(angle) as f32, libm::sin(angle) as f32])
+}
+
+/// The larger eigenvalue.
+fn most(a: f32, b: f32, c: f32) -> f32 {
     let (a, b, c) = (f64::from(a), f64::from(b), f64::from(c));
-    let root = libm::hypot(a - c, 2.0 * b);
-    let angle = 0.5 * libm::atan2(2.0 * b, a - c);
-    ((0.5 * (a + c + root)) as f32, [libm::cos(angle) as f32, libm::sin(angle) as f32])
+    (0.5 * (a + c + libm::hypot(a - c, 2.0 * b))) as f32
 }
 
 /// The gradient of a picture of several channels, smoothed by a Gaussian of `sigma` pixels.
@@ -90,14 +144,8 @@ pub fn colour_gradient<const N: usize>(width: u32, height: u32, pixels: &[[f32; 
             *t = [t[0] + x * x, t[1] + x * y, t[2] + y * y];
         }
     }
-    let (magnitude, normal) = tensor
-        .into_iter()
-        .map(|[a, b, c]| {
-            let (most, direction) = principal(a, b, c);
-            (most.max(0.0).sqrt(), direction)
-        })
-        .unzip();
-    Gradient { width, height, magnitude, normal }
+    let magnitude = tensor.iter().map(|&[a, b, c]| most(a, b, c).max(0.0).sqrt()).collect();
+    Gradient { width, height, magnitude, tensor }
 }
 
 #[cfg(test)]
@@ -118,8 +166,27 @@ mod tests {
             for i in 5..19 {
                 let k = j * w as usize + i;
                 assert!((g.magnitude[k] - 5.0).abs() < 1e-4);
-                let dot = g.normal[k][0] * 0.6 + g.normal[k][1] * 0.8;
+                let dot = g.normal(k)[0] * 0.6 + g.normal(k)[1] * 0.8;
                 assert!((dot.abs() - 1.0).abs() < 1e-5);
+            }
+        }
+    }
+
+    #[test]
+    fn filters_are_sums_in_the_order_of_the_kernel() {
+        let (smooth, slope) = kernels(1.3);
+        let sum = |kernel: &[f64], at: &dyn Fn(i64) -> f32| {
+            let reach = (kernel.len() / 2) as i64;
+            kernel.iter().zip(-reach..).fold(0.0, |s, (c, k)| s + c * f64::from(at(k))) as f32
+        };
+        for (w, h) in [(1usize, 1usize), (3, 2), (16, 7), (37, 23)] {
+            let data: Vec<f32> = (0..w * h).map(|i| ((i * 7919) % 613) as f32 / 7.0 - 40.0).collect();
+            let (rows, columns) = (along_rows(w, &data, &slope), along_columns(w, &data, &smooth));
+            for i in 0..w * h {
+                let (x, y) = ((i % w) as i64, (i / w) as i64);
+                let row = sum(&slope, &|k| data[y as usize * w + mirrored(x + k, w as i64)]);
+                let column = sum(&smooth, &|k| data[mirrored(y + k, h as i64) * w + x as usize]);
+                assert_eq!((rows[i], columns[i]), (row, column), "{w} x {h}");
             }
         }
     }

@@ -19,6 +19,7 @@ mod field;
 pub mod gradient;
 pub mod keypoints;
 pub mod mask;
+mod nearest;
 pub mod nms;
 pub mod npy;
 pub mod photo;

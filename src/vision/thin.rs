@@ -9,55 +9,69 @@ const RING: [(i64, i64); 8] = [(0, -1), (1, -1), (1, 0), (1, 1), (0, 1), (-1, 1)
 
 /// Which pixels of a map (0: nothing) are left; `width * height` values.
 pub(super) fn thinned(width: u32, height: u32, map: &[u8]) -> Vec<bool> {
-    let (w, h) = (width as i64, height as i64);
-    let mut set: Vec<bool> = map.iter().map(|&v| v > 0).collect();
-    // Distances to the nearest empty pixel; beyond the border nothing is set.
-    let (pw, ph) = (width as usize + 2, height as usize + 2);
-    let mut empty = vec![true; pw * ph];
-    for (k, &s) in set.iter().enumerate() {
-        empty[(k / width.max(1) as usize + 1) * pw + k % width.max(1) as usize + 1] = !s;
+    let (w, h) = (width as usize, height as usize);
+    // With an empty pixel on every side, so that all pixels of the map have eight neighbours.
+    let across = w + 2;
+    let mut strength = vec![0u8; across * (h + 2)];
+    for (row, out) in map.chunks_exact(w.max(1)).zip(strength.chunks_exact_mut(across).skip(1)) {
+        out[1..=w].copy_from_slice(row);
     }
-    let padded = distance_transform(width + 2, height + 2, &empty).values;
-    let depth = |k: usize| padded[(k / width as usize + 1) * pw + k % width as usize + 1];
+    let mut set: Vec<bool> = strength.iter().map(|&s| s > 0).collect();
+    // Distances to the nearest empty pixel.
+    let empty: Vec<bool> = set.iter().map(|s| !s).collect();
+    let depth = distance_transform(width + 2, height + 2, &empty).values;
+    let ring = RING.map(|(dx, dy)| dy * across as i64 + dx);
+    let around = |k: usize| ring.map(|o| (k as i64 + o) as usize);
 
-    let mut order: Vec<usize> = (0..set.len()).filter(|&k| set[k]).collect();
-    order.sort_by(|&a, &b| map[a].cmp(&map[b]).then(depth(a).total_cmp(&depth(b))).then(a.cmp(&b)));
-    let neighbour = |k: usize, (dx, dy): (i64, i64)| {
-        let (x, y) = (k as i64 % w + dx, k as i64 / w + dy);
-        (x >= 0 && y >= 0 && x < w && y < h).then_some((y * w + x) as usize)
-    };
+    // Bits of numbers that are not negative have their order.
+    let key = |k: usize| (u64::from(strength[k]) << 32 | u64::from(depth[k].to_bits()), k);
+    let mut order: Vec<(u64, usize)> = (0..set.len()).filter(|&k| set[k]).map(key).collect();
+    order.sort_unstable();
+    let simple = SIMPLE;
     // Removing a pixel may free an earlier one, so until nothing changes.
     loop {
         let before = order.len();
-        order.retain(|&k| {
-            let ring = RING.map(|o| neighbour(k, o).filter(|&n| set[n]));
-            let remove = is_simple(&ring.map(|n| n.is_some())) && !is_end(k, &ring, map, &depth);
-            if remove {
-                set[k] = false;
-            }
+        order.retain(|&(_, k)| {
+            let around = around(k);
+            let ring = (0..8).fold(0u8, |bits, i| bits | u8::from(set[around[i]]) << i);
+            let remove = simple[usize::from(ring)] && !is_end(k, ring, &around, &strength, &depth);
+            set[k] &= !remove;
             !remove
         });
         if order.len() == before {
-            return set;
+            return set.chunks_exact(across).skip(1).take(h).flat_map(|row| &row[1..=w]).copied().collect();
         }
     }
 }
 
-/// Whether the set neighbours stay in one piece, and the empty ones too, without the pixel: the 8-connectivity number is 1
-/// (Yokoi, Toriwaki & Fukumura 1975), which is false inside areas and for lone pixels.
-fn is_simple(ring: &[bool; 8]) -> bool {
-    let empty = |i: usize| u8::from(!ring[i % 8]);
-    let number: u8 = (0..4).map(|i| empty(2 * i) - empty(2 * i) * empty(2 * i + 1) * empty(2 * i + 2)).sum();
-    number == 1
-}
+/// For every set of neighbours (bit i: the i-th of [`RING`]) whether those that are set stay in one piece, and the empty ones too,
+/// without the pixel: the 8-connectivity number is 1 (Yokoi, Toriwaki & Fukumura 1975), which is false inside areas and for lone
+/// pixels.
+const SIMPLE: [bool; 256] = {
+    let mut table = [false; 256];
+    let mut ring = 0;
+    while ring < 256 {
+        let (mut number, mut i) = (0, 0);
+        while i < 8 {
+            let empty = [ring >> i & 1 == 0, ring >> (i + 1) & 1 == 0, ring >> ((i + 2) % 8) & 1 == 0];
+            if empty[0] && !(empty[1] && empty[2]) {
+                number += 1;
+            }
+            i += 2;
+        }
+        table[ring] = number == 1;
+        ring += 1;
+    }
+    table
+};
 
 /// Whether a pixel is the end of a line, rather than of a spur: one neighbour, or two side by side, that are neither much
 /// stronger nor deeper inside.
-fn is_end(k: usize, ring: &[Option<usize>; 8], map: &[u8], depth: &dyn Fn(usize) -> f32) -> bool {
-    let count = ring.iter().flatten().count();
-    let close = (0..8).any(|i| ring[i].is_some() && ring[(i + 1) % 8].is_some());
-    (count == 1 || count == 2 && close)
-        && ring.iter().flatten().all(|&n| 10 * u16::from(map[k]) >= 8 * u16::from(map[n]) && depth(k) >= depth(n) - 0.3)
+fn is_end(k: usize, ring: u8, around: &[usize; 8], strength: &[u8], depth: &[f32]) -> bool {
+    let close = ring & ring.rotate_left(1) != 0;
+    let few = ring.count_ones() == 1 || ring.count_ones() == 2 && close;
+    let weak = |n: usize| 10 * u16::from(strength[k]) >= 8 * u16::from(strength[n]) && depth[k] >= depth[n] - 0.3;
+    few && (0..8).filter(|i| ring >> i & 1 == 1).all(|i| weak(around[i]))
 }
 
 #[cfg(test)]

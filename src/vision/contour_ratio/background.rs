@@ -7,6 +7,8 @@
 
 use super::super::field::Edges;
 use super::ContourRatioOptions;
+use super::ratio::Ratio;
+use crate::num::simd::vectorised;
 
 /// Bins of the distance, up to the truncation.
 const BINS: usize = 24;
@@ -22,34 +24,51 @@ type Masses = [f32; BINS];
 
 /// The score at every place, from the distances in percent of the diagonal.
 pub(super) fn scores(grid: &Edges, distance: &[f32], options: &ContourRatioOptions) -> Vec<f32> {
-    let (w, h) = (grid.width as usize, grid.height as usize);
-    let windows = Windows::new(w, h, distance, options);
+    let w = grid.width as usize;
+    let mut windows = Windows::new(w, grid.height as usize, distance, options);
     let bin = options.truncate / BINS as f64;
-    let floor = libm::log(1.0 - options.foreground) as f32;
-    let norm = 2.0 / (libm::sqrt(2.0 * std::f64::consts::PI) * options.sd);
-    let mut out = Vec::with_capacity(w * h);
-    for (i, &d) in distance.iter().enumerate() {
-        let d = f64::from(d);
-        if d >= options.truncate {
-            out.push(floor);
-            continue;
+    let ratio = Ratio::new(options);
+    let mut out = vec![libm::log(1.0 - options.foreground) as f32; distance.len()];
+    // The places of a row that are near an edge, side by side.
+    let (mut places, mut near, mut density) = (Vec::with_capacity(w), Vec::with_capacity(w), Vec::with_capacity(w));
+    let mut scores = Vec::with_capacity(w);
+    for (y, (distance, out)) in distance.chunks_exact(w).zip(out.chunks_exact_mut(w)).enumerate() {
+        places.clear();
+        near.clear();
+        density.clear();
+        windows.enter(y as f32);
+        for (x, &d) in distance.iter().enumerate() {
+            let d = f64::from(d);
+            if d < options.truncate {
+                places.push(x as u32);
+                near.push(d);
+                density.push(f64::from(windows.mass(x, (d / bin) as f32)) / bin);
+            }
         }
-        let density = f64::from(windows.mass((i % w) as f32, (i / w) as f32, (d / bin) as f32)) / bin;
-        let z = d / options.sd;
-        let own = norm * libm::exp(-0.5 * z * z);
-        let score = libm::log(options.foreground * own / density + 1.0 - options.foreground);
-        out.push(if score.is_finite() { score as f32 } else { floor });
+        ratio.scores(&near, &density, &mut scores);
+        for (&x, &score) in places.iter().zip(&scores).filter(|(_, s)| s.is_finite()) {
+            out[x as usize] = score;
+        }
     }
     out
 }
 
+/// A bin's mass in the windows about a place, and how much more there is in the next bin: up left, up right, down left, down right.
+type Quad = [[f32; 4]; 2];
+
 /// The windows' distributions.
 struct Windows {
-    across: usize,
     down: usize,
     /// Side of a tile in grid units.
     side: f32,
     masses: Vec<Masses>,
+    /// For every column the window on its left, and how far it is to the next one.
+    columns: Vec<(u32, f32)>,
+    /// How far the row that was entered is from the windows above it.
+    below: f32,
+    /// The window row above it, and the quads between that and the next.
+    above: usize,
+    quads: Vec<[Quad; BINS]>,
 }
 
 impl Windows {
@@ -58,9 +77,11 @@ impl Windows {
         let (across, down) = (w.div_ceil(side), h.div_ceil(side));
         let mut counts = vec![[0u32; BINS + 1]; across * down];
         let per_bin = BINS as f64 / options.truncate;
-        for (i, &d) in distance.iter().enumerate() {
-            let bin = ((f64::from(d) * per_bin) as usize).min(BINS);
-            counts[(i / w / side) * across + (i % w) / side][bin] += 1;
+        for (y, row) in distance.chunks_exact(w).enumerate() {
+            let tiles = &mut counts[y / side * across..][..across];
+            for (tile, row) in tiles.iter_mut().zip(row.chunks(side)) {
+                row.iter().for_each(|&d| tile[((f64::from(d) * per_bin) as u32 as usize).min(BINS)] += 1);
+            }
         }
         let mut all = [0u64; BINS + 1];
         for tile in &counts {
@@ -70,15 +91,22 @@ impl Windows {
         let total = all.iter().sum::<u64>() as f64 + (BINS + 1) as f64;
         let reach_x = (0.5 * options.window * w as f64 / side as f64).max(0.5);
         let reach_y = (0.5 * options.window * h as f64 / side as f64).max(0.5);
+        let counts: Vec<[f64; BINS + 1]> = counts.into_iter().map(|tile| tile.map(f64::from)).collect();
         let mut masses = Vec::with_capacity(across * down);
         for ty in 0..down {
             for tx in 0..across {
                 let mut sum = [0.0f64; BINS + 1];
-                for (v, wy) in overlap(ty, reach_y, down) {
-                    for (u, wx) in overlap(tx, reach_x, across) {
-                        sum.iter_mut().zip(&counts[v * across + u]).for_each(|(s, &n)| *s += wx * wy * f64::from(n));
-                    }
-                }
+                vectorised(
+                    #[inline(always)]
+                    || {
+                        for (v, wy) in overlap(ty, reach_y, down) {
+                            for (u, wx) in overlap(tx, reach_x, across) {
+                                let weight = wx * wy;
+                                sum.iter_mut().zip(&counts[v * across + u]).for_each(|(s, &n)| *s += weight * n);
+                            }
+                        }
+                    },
+                );
                 let count: f64 = sum.iter().sum();
                 masses.push(std::array::from_fn(|b| {
                     let own = if count > 0.0 { sum[b] / count } else { 0.0 };
@@ -86,21 +114,44 @@ impl Windows {
                 }));
             }
         }
-        Windows { across, down, side: side as f32, masses }
+        let side = side as f32;
+        let column = |x: usize| {
+            let (left, _, fraction) = between((x as f32 + 0.5) / side - 0.5, across);
+            (left as u32, fraction)
+        };
+        let quads = vec![[[[0.0; 4]; 2]; BINS]; across];
+        Windows { down, side, masses, columns: (0..w).map(column).collect(), below: 0.0, above: usize::MAX, quads }
     }
 
-    /// The mass per bin at a place of the grid and a distance in bins.
-    fn mass(&self, x: f32, y: f32, bins: f32) -> f32 {
-        let (u0, u1, fu) = between((x + 0.5) / self.side - 0.5, self.across);
-        let (v0, v1, fv) = between((y + 0.5) / self.side - 0.5, self.down);
-        let (b0, b1, fb) = between(bins - 0.5, BINS);
-        let at = |v: usize, u: usize| {
-            let m = &self.masses[v * self.across + u];
-            m[b0] + fb * (m[b1] - m[b0])
-        };
-        let top = at(v0, u0) + fu * (at(v0, u1) - at(v0, u0));
-        let bottom = at(v1, u0) + fu * (at(v1, u1) - at(v1, u0));
-        top + fv * (bottom - top)
+    /// Turns to a row of the grid.
+    fn enter(&mut self, y: f32) {
+        let (v0, v1, below) = between((y + 0.5) / self.side - 0.5, self.down);
+        self.below = below;
+        if self.above == v0 {
+            return;
+        }
+        self.above = v0;
+        let across = self.quads.len();
+        for (u, bins) in self.quads.iter_mut().enumerate() {
+            let next = (u + 1).min(across - 1);
+            let four = [v0 * across + u, v0 * across + next, v1 * across + u, v1 * across + next];
+            for (b, quad) in bins.iter_mut().enumerate() {
+                let at = four.map(|t| self.masses[t][b]);
+                let next = four.map(|t| self.masses[t][(b + 1).min(BINS - 1)]);
+                *quad = [at, std::array::from_fn(|i| next[i] - at[i])];
+            }
+        }
+    }
+
+    /// The mass per bin at a place of that row and a distance in bins.
+    #[inline]
+    fn mass(&self, x: usize, bins: f32) -> f32 {
+        let (left, fu) = self.columns[x];
+        let (bin, _, fb) = between(bins - 0.5, BINS);
+        let [at, more] = &self.quads[left as usize][bin];
+        let [a, b, c, d] = std::array::from_fn(|i| at[i] + fb * more[i]);
+        let (top, bottom) = (a + fu * (b - a), c + fu * (d - c));
+        top + self.below * (bottom - top)
     }
 }
 
@@ -113,8 +164,9 @@ fn overlap(at: usize, reach: f64, n: usize) -> impl Iterator<Item = (usize, f64)
 }
 
 /// The two of `n` samples next to a position, clamped, and the fraction between them.
+#[inline]
 fn between(position: f32, n: usize) -> (usize, usize, f32) {
     let p = position.clamp(0.0, (n - 1) as f32);
-    let low = p as usize;
+    let low = p as u32 as usize;
     (low, (low + 1).min(n - 1), p - low as f32)
 }

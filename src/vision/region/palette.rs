@@ -3,7 +3,8 @@
 //! Not a general clustering: three coordinates, at most 256 clusters. Invariant: every label is below the number of colours,
 //! and the same picture gives the same labels on every machine.
 
-use crate::vision::color::linear_to_lab;
+use crate::num::simd::vectorised;
+use crate::vision::color::linear_to_labs;
 use crate::vision::elements::{ComparatorError, check_size};
 use crate::vision::photo::LinearImage;
 
@@ -39,19 +40,20 @@ impl Quantised {
     /// # Errors
     /// As [`Quantised::new`].
     pub fn of(picture: &LinearImage, colours: usize) -> Result<Self, ComparatorError> {
-        let lab: Vec<[f32; 3]> = picture.rgb.iter().map(|p| linear_to_lab(*p)).collect();
+        let lab = linear_to_labs(&picture.rgb);
         let step = lab.len().div_ceil(FITTED).max(1);
         let some: Vec<[f32; 3]> = lab.iter().copied().step_by(step).collect();
         let mut centres = start(&some, colours.clamp(1, 256));
         let mut labels = vec![0; some.len()];
+        let lists = planes(&some);
         for _ in 0..ROUNDS {
-            label(&some, &centres, &mut labels);
+            label(&lists, &centres, &mut labels);
             if !recentre(&some, &labels, &mut centres) {
                 break;
             }
         }
         let mut labels = vec![0; lab.len()];
-        label(&lab, &centres, &mut labels);
+        label(&planes(&lab), &centres, &mut labels);
         Quantised::new(picture.width, picture.height, centres.len(), labels)
     }
 
@@ -122,18 +124,40 @@ fn start(points: &[[f32; 3]], colours: usize) -> Vec<[f32; 3]> {
     boxes.iter().map(|(_, mean, _)| mean.map(|m| m as f32)).collect()
 }
 
+/// Points that are compared with a centre side by side.
+const BLOCK: usize = 32;
+
+/// The coordinates of points in lists of their own, with zeros to the end of a block.
+fn planes(points: &[[f32; 3]]) -> [Vec<f32>; 3] {
+    let list = |c: usize| {
+        let mut list: Vec<f32> = points.iter().map(|p| p[c]).collect();
+        list.resize(points.len().next_multiple_of(BLOCK), 0.0);
+        list
+    };
+    [list(0), list(1), list(2)]
+}
+
 /// The nearest centre of every point, the first among equals.
-fn label(points: &[[f32; 3]], centres: &[[f32; 3]], labels: &mut [u8]) {
-    for (p, l) in points.iter().zip(labels) {
-        let mut best = (f32::INFINITY, 0);
-        for (k, c) in centres.iter().enumerate() {
-            let d = [p[0] - c[0], p[1] - c[1], p[2] - c[2]];
-            let d = d[0] * d[0] + d[1] * d[1] + d[2] * d[2];
-            if d < best.0 {
-                best = (d, k);
-            }
-        }
-        *l = best.1 as u8;
+fn label([l, a, b]: &[Vec<f32>; 3], centres: &[[f32; 3]], labels: &mut [u8]) {
+    let blocks = l.as_chunks().0.iter().zip(a.as_chunks().0).zip(b.as_chunks().0);
+    for (((l, a), b), labels) in blocks.zip(labels.chunks_mut(BLOCK)) {
+        let [l, a, b]: [&[f32; BLOCK]; 3] = [l, a, b];
+        let (mut least, mut nearest) = ([f32::INFINITY; BLOCK], [0u32; BLOCK]);
+        vectorised(
+            #[inline(always)]
+            || {
+                for (k, c) in centres.iter().enumerate() {
+                    for i in 0..BLOCK {
+                        let d = [l[i] - c[0], a[i] - c[1], b[i] - c[2]];
+                        let d = d[0] * d[0] + d[1] * d[1] + d[2] * d[2];
+                        let nearer = d < least[i];
+                        nearest[i] = if nearer { k as u32 } else { nearest[i] };
+                        least[i] = if nearer { d } else { least[i] };
+                    }
+                }
+            },
+        );
+        labels.iter_mut().zip(nearest).for_each(|(l, k)| *l = k as u8);
     }
 }
 
@@ -192,7 +216,7 @@ mod tests {
             .collect();
         let squares = |centres: &[[f32; 3]]| {
             let mut labels = vec![0; points.len()];
-            label(&points, centres, &mut labels);
+            label(&planes(&points), centres, &mut labels);
             let d = |p: &[f32; 3], l: &u8| (0..3).map(|c| (p[c] - centres[*l as usize][c]).powi(2)).sum::<f32>();
             points.iter().zip(&labels).map(|(p, l)| f64::from(d(p, l))).sum::<f64>()
         };
@@ -202,7 +226,7 @@ mod tests {
         let first = last;
         let mut labels = vec![0; points.len()];
         for _ in 0..8 {
-            label(&points, &centres, &mut labels);
+            label(&planes(&points), &centres, &mut labels);
             recentre(&points, &labels, &mut centres);
             let now = squares(&centres);
             assert!(now <= last * (1.0 + 1e-6));

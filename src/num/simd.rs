@@ -5,7 +5,7 @@
 
 /// Runs `work`, compiled for the processor's widest instructions as far as it is inlined.
 #[inline]
-pub(super) fn vectorised<R>(work: impl FnOnce() -> R) -> R {
+pub(crate) fn vectorised<R>(work: impl FnOnce() -> R) -> R {
     #[cfg(test)]
     if PORTABLE.get() {
         return work();
@@ -20,7 +20,7 @@ thread_local! {
 
 /// Runs `work` as on a processor without wide instructions.
 #[cfg(test)]
-pub(super) fn portable<R>(work: impl FnOnce() -> R) -> R {
+pub(crate) fn portable<R>(work: impl FnOnce() -> R) -> R {
     PORTABLE.set(true);
     let out = work();
     PORTABLE.set(false);
