@@ -7,6 +7,7 @@ mod camera;
 mod camera_json;
 mod contours;
 mod crossing;
+mod detail;
 mod frame;
 mod layers;
 mod looked;
