@@ -71,3 +71,107 @@ fn allowed(instance: &Instance, camera: &Camera, pixels: f64) -> Option<f64> {
     let allowed = pixels / (most * instance.affine.stretch());
     (nearest >= Camera::NEAR && allowed > 0.0).then_some(allowed)
 }
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+    use crate::geom::{Affine, Caps, Profile};
+    use crate::render::testing::lathe;
+    use crate::render::{Channels, Contours, Frame, View};
+
+    /// A lathe, a mesh as from a file, and a thing without coarser versions.
+    fn group() -> Solid {
+        let y: Vec<f64> = (0..25).map(|i| f64::from(i) / 12.0 - 1.0).collect();
+        let r = y.iter().map(|y| 0.5 + 0.1 * libm::sin(5.0 * y)).collect();
+        let vase = Solid::lathe(&[Profile { y, r }], 48, 0.0, Caps::Both).unwrap();
+        let fine = lathe(&[(0.3, -0.8), (0.7, -0.2), (0.65, 0.1), (0.4, 0.5), (0.6, 0.9)], 96, true);
+        let file = Solid::lasting((*fine.instances()[0].mesh).clone());
+        let at = |x: f64, turn: f64| Affine::new(DVec3::new(x, 0.0, 0.0), DVec3::new(turn, 0.3, 0.1), DVec3::ONE);
+        Solid::group(&[vase.placed(at(-1.2, 0.4)), file.placed(at(1.0, -0.3)), fine.placed(at(0.0, 0.9))])
+    }
+
+    fn triangles(solid: &Solid) -> Vec<usize> {
+        solid.instances().iter().map(|i| i.mesh.topology.triangles.len()).collect()
+    }
+
+    #[test]
+    fn what_is_far_is_coarse_and_nothing_is_without_leave() {
+        let (solid, camera) = (group(), Camera::default_for(128, 128));
+        let shown = |scale: f64, detail: f64| {
+            let by = Affine::new(DVec3::ZERO, DVec3::ZERO, DVec3::splat(scale));
+            triangles(&Drawn::new(&solid.placed(by), &camera, detail).solid)
+        };
+        for detail in [0.0, -1.0, f64::NAN] {
+            assert_eq!(shown(1.0, detail), triangles(&solid));
+        }
+        let (near, far) = (shown(1.0, 0.5), shown(0.2, 0.5));
+        assert!(near[0] < triangles(&solid)[0] && far[0] < near[0] && far[1] < triangles(&solid)[1]);
+        assert_eq!(far[2], triangles(&solid)[2], "nothing is known about this one");
+        // Around the eye nothing is made coarser.
+        assert_eq!(shown(40.0, 1.0), triangles(&solid));
+        let parallel =
+            Camera { projection: Projection::Orthographic { units_per_pixel: 0.05, cx: 64.0, cy: 64.0 }, ..camera };
+        assert!(triangles(&Drawn::new(&solid, &parallel, 0.5).solid)[0] < near[0]);
+    }
+
+    #[test]
+    fn contours_do_not_depend_on_what_was_drawn_before() {
+        let (solid, camera) = (group(), Camera::default_for(128, 128));
+        let plain = View::new(solid.clone(), camera);
+        assert_eq!(*plain.contours(128), Contours::of(&solid, &camera));
+        let view = |detail: f64| View::with_detail(solid.clone(), camera, detail);
+        assert_eq!(*view(0.0).contours(128), *plain.contours(128));
+        let wanted = view(0.5).contours(128);
+        assert_ne!(*wanted, *plain.contours(128));
+        for before in [View::frame, View::depth] {
+            let view = view(0.5);
+            before(&view, 128);
+            assert_eq!(*view.contours(128), *wanted);
+            assert_eq!(view.frame(128).depth, Frame::render(&solid, &camera, Channels::Depth).depth);
+        }
+        let other = group();
+        let there = std::thread::scope(|s| {
+            let work = || View::with_detail(other, camera, 0.5).contours(128);
+            s.spawn(work).join().unwrap()
+        });
+        assert_eq!(*there, *wanted);
+    }
+
+    #[test]
+    fn derivatives_are_by_the_vertices_of_the_solid() {
+        let camera = Camera::default_for(96, 96);
+        let parallel =
+            Camera { projection: Projection::Orthographic { units_per_pixel: 0.05, cx: 48.0, cy: 48.0 }, ..camera };
+        for camera in [camera, parallel] {
+            let at = |by: Affine| View::with_detail(group().placed(by), camera, 0.5);
+            let view = at(Affine::IDENTITY);
+            let contours = view.contours(96);
+            let by: Vec<[f64; 4]> = contours
+                .x
+                .iter()
+                .map(|x| [0.5 + 0.1 * libm::sin(f64::from(*x)), libm::cos(f64::from(*x)), 0.7, 0.0])
+                .collect();
+            let found = view.pull_contours(96, &by);
+            assert_eq!(found.len(), view.solid().vertex_count());
+            assert!(view.triangles(96) < triangles(view.solid()).iter().sum());
+            let drawn = view.drawn(&camera);
+            let plain = contours.pull(&drawn.solid, &camera, &by);
+            let sum = |all: &[DVec3]| all.iter().map(|g| g.length_squared()).sum::<f64>();
+            assert!(sum(&found) > 0.0 && (sum(&found) - sum(&plain)).abs() < 1e-9 * sum(&plain));
+            // The same place has the same derivative: moving all by a placement moves the pieces of what is drawn.
+            for axis in [DVec3::X, DVec3::Y] {
+                let score = |h: f64| {
+                    let c = at(Affine::new(axis * h, DVec3::ZERO, DVec3::ONE)).contours(96);
+                    assert_eq!(c.len(), contours.len(), "the same pieces");
+                    let one = |(i, by): (usize, &[f64; 4])| {
+                        [c.x[i], c.y[i], c.length[i]].iter().zip(by).map(|(x, by)| f64::from(*x) * by).sum::<f64>()
+                    };
+                    by.iter().enumerate().map(one).sum::<f64>()
+                };
+                let slope = (score(1e-4) - score(-1e-4)) / 2e-4;
+                let along: f64 = found.iter().map(|g| g.dot(axis)).sum();
+                assert!((along - slope).abs() < 0.02 * along.abs() + 30.0, "{along} {slope}");
+            }
+        }
+    }
+}

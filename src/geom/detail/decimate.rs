@@ -16,11 +16,13 @@ use std::collections::BinaryHeap;
 
 /// No level has fewer triangles than about this.
 const FEWEST: usize = 100;
+/// Above this many triangles levels halve them, below they leave seven in ten.
+const MANY: usize = 10_000;
 /// What an edge's squared length adds to the squared distances: among equals the shortest goes first.
 const BY_LENGTH: f64 = 1e-3;
 /// A face turns by at most 60 degrees in one step: the cosine.
 const LEAST_TURN_COS: f64 = 0.5;
-/// The least quality of a face that gets worse: 1 for an equilateral one, 0 for none.
+/// The least quality that a face may come to: 1 for an equilateral one, 0 for one without area.
 const LEAST_QUALITY: f64 = 0.08;
 
 /// Edges that show or mean something, in bits. One can be several.
@@ -57,7 +59,7 @@ pub(super) struct Step {
     pub merged: Vec<u32>,
 }
 
-/// Ever coarser surfaces, each of about half the triangles of the one before, down to some hundred.
+/// Ever coarser surfaces, down to some hundred triangles.
 pub(super) fn decimate(fine: &Fine) -> Vec<Step> {
     let mut steps = Vec::new();
     if fine.triangles.len() < 2 * FEWEST {
@@ -66,33 +68,31 @@ pub(super) fn decimate(fine: &Fine) -> Vec<Step> {
     let mut surface = Surface::new(fine);
     let mut queue = BinaryHeap::new();
     (0..surface.at.len() as u32).for_each(|p| surface.enqueue(p, &mut queue));
-    let mut wanted = surface.live / 2;
-    while let Some(Reverse((_, from, stamp))) = queue.pop() {
-        if surface.stamps[from as usize] != stamp {
-            continue;
-        }
-        let to = surface.targets[from as usize];
-        let Some(collapse) = surface.collapse(from, to) else {
-            // What lies around the target has changed meanwhile.
+    let next = |live: usize| if live > MANY { live / 2 } else { live * 7 / 10 };
+    let mut wanted = next(surface.live);
+    while let Some(Reverse((_, from))) = queue.pop() {
+        let Plan { to, stale, .. } = surface.plans[from as usize];
+        surface.plans[from as usize].queued = false;
+        // What lies around may have changed meanwhile; costs mostly rise, so few go in too late.
+        let collapse = if stale { None } else { surface.collapse(from, to, &surface.neighbours(from)) };
+        let Some(collapse) = collapse else {
             surface.enqueue(from, &mut queue);
             continue;
         };
         surface.apply(&collapse);
-        surface.enqueue(to, &mut queue);
-        for p in surface.neighbours(to) {
-            surface.enqueue(p, &mut queue);
+        for p in surface.neighbours(to).into_iter().chain([to]) {
+            surface.plans[p as usize].stale = true;
+            if !surface.plans[p as usize].queued {
+                surface.enqueue(p, &mut queue);
+            }
         }
         if surface.live <= wanted {
             steps.push(surface.step());
-            wanted = surface.live / 2;
+            wanted = next(surface.live);
             if wanted < FEWEST {
-                return steps;
+                break;
             }
         }
-    }
-    // What is left cannot be halved any more; it may still be worth having.
-    if surface.live < 3 * wanted / 2 {
-        steps.push(surface.step());
     }
     steps
 }
@@ -114,13 +114,22 @@ struct Surface<'a> {
     lines_at: Vec<u8>,
     quadrics: Vec<Quadric>,
     merged: Vec<u32>,
-    /// For each point the best one to go to, and a number that tells the latest entry of the queue.
-    targets: Vec<u32>,
-    stamps: Vec<u32>,
+    plans: Vec<Plan>,
 }
 
-/// Cost (bits of a number that is not negative), point and stamp; the least first.
-type Queue = BinaryHeap<Reverse<(u64, u32, u32)>>;
+/// What a point would do next.
+#[derive(Clone, Copy, Default)]
+struct Plan {
+    /// Where it would go.
+    to: u32,
+    /// Whether it waits in the queue.
+    queued: bool,
+    /// Whether its surroundings have changed since.
+    stale: bool,
+}
+
+/// Cost (bits of a number that is not negative) and point; the least first.
+type Queue = BinaryHeap<Reverse<(u64, u32)>>;
 
 /// A collapse that may be done.
 struct Collapse {
@@ -150,14 +159,13 @@ impl<'a> Surface<'a> {
             lines_at: vec![0; count],
             quadrics: vec![Quadric::default(); count],
             merged: (0..count as u32).collect(),
-            targets: vec![0; count],
-            stamps: vec![0; count],
+            plans: vec![Plan::default(); count],
             point,
         };
         for f in 0..surface.triangles.len() {
             if surface.left[f] {
                 let points = surface.points(f as u32);
-                let plane = surface.normal(points.map(|p| surface.at[p as usize]));
+                let plane = normal(points.map(|p| surface.at[p as usize])).try_normalize();
                 for p in points {
                     surface.around[p as usize].push(f as u32);
                     if let Some(normal) = plane {
@@ -209,8 +217,8 @@ impl<'a> Surface<'a> {
     /// A plane through an edge at right angles to a face beside it keeps collapses from moving the line sideways.
     fn keep_line(&mut self, a: u32, b: u32, face: u32) {
         let [p, q] = [a, b].map(|p| self.at[p as usize]);
-        let normal = self.normal(self.points(face).map(|p| self.at[p as usize]));
-        if let Some(side) = normal.and_then(|n| (q - p).cross(n).try_normalize()) {
+        let across = (q - p).cross(normal(self.points(face).map(|p| self.at[p as usize])));
+        if let Some(side) = across.try_normalize() {
             let plane = Quadric::plane(side, p);
             self.quadrics[a as usize] += plane;
             self.quadrics[b as usize] += plane;
@@ -219,10 +227,6 @@ impl<'a> Surface<'a> {
 
     fn points(&self, face: u32) -> [u32; 3] {
         self.triangles[face as usize].map(|v| self.point[v as usize])
-    }
-
-    fn normal(&self, [a, b, c]: [DVec3; 3]) -> Option<DVec3> {
-        (b - a).cross(c - a).try_normalize()
     }
 
     /// The vertex that a face has at a point.
@@ -239,31 +243,29 @@ impl<'a> Surface<'a> {
         all
     }
 
-    /// Finds the best collapse of a point and puts it into the queue, in place of the one before.
+    /// Puts a point into the queue with the best collapse that it may do, if there is one.
     fn enqueue(&mut self, from: u32, queue: &mut Queue) {
-        self.stamps[from as usize] += 1;
-        let here = self.at[from as usize];
+        let lines = self.lines_at[from as usize];
+        if lines != 0 && lines != 2 {
+            return;
+        }
+        let (here, ours) = (self.at[from as usize], self.neighbours(from));
         let cost = |to: u32| {
             let there = self.at[to as usize];
             let sum = self.quadrics[from as usize] + self.quadrics[to as usize];
             (sum.at(there) + BY_LENGTH * here.distance_squared(there)).to_bits()
         };
-        let lines = self.lines_at[from as usize];
-        if lines != 0 && lines != 2 {
-            return;
-        }
-        let ways = self.neighbours(from).into_iter();
-        let mut ways: SmallVec<[(u64, u32); 16]> =
-            ways.filter(|to| lines == 0 || self.lines.contains_key(&pair(from, *to))).map(|to| (cost(to), to)).collect();
+        let ways = ours.iter().filter(|to| lines == 0 || self.lines.contains_key(&pair(from, **to)));
+        let mut ways: SmallVec<[(u64, u32); 16]> = ways.map(|to| (cost(*to), *to)).collect();
         ways.sort_unstable();
-        if let Some((cost, to)) = ways.into_iter().find(|(_, to)| self.collapse(from, *to).is_some()) {
-            self.targets[from as usize] = to;
-            queue.push(Reverse((cost, from, self.stamps[from as usize])));
+        if let Some((cost, to)) = ways.into_iter().find(|(_, to)| self.collapse(from, *to, &ours).is_some()) {
+            self.plans[from as usize] = Plan { to, queued: true, stale: false };
+            queue.push(Reverse((cost, from)));
         }
     }
 
-    /// The collapse of a point into a neighbour, if it may be done.
-    fn collapse(&self, from: u32, to: u32) -> Option<Collapse> {
+    /// The collapse of a point into one of its neighbours, if it may be done.
+    fn collapse(&self, from: u32, to: u32, ours: &[u32]) -> Option<Collapse> {
         let around = &self.around[from as usize];
         let kind = |p: u32| self.lines.get(&pair(from, p)).copied().unwrap_or(0);
         let mut vertices: SmallVec<[(u32, u32); 2]> = SmallVec::new();
@@ -283,9 +285,8 @@ impl<'a> Surface<'a> {
             apexes.extend(points.into_iter().find(|p| *p != from && *p != to));
         }
         // The link condition: neighbours in common are those of the faces that go.
-        let (ours, theirs) = (self.neighbours(from), self.neighbours(to));
+        let theirs = self.neighbours(to);
         let common = ours.iter().filter(|p| theirs.binary_search(p).is_ok()).count();
-        let is_line = kind(to) != 0;
         let faces = if kind(to) & BOUNDARY != 0 { 1 } else { 2 };
         if apexes.len() != faces || common != faces || apexes.iter().any(|p| self.around[*p as usize].len() < 2) {
             return None;
@@ -293,7 +294,7 @@ impl<'a> Surface<'a> {
         if self.lines_at[from as usize] != 0 {
             // Along a line of one kind, and not onto another line.
             let other = ours.iter().copied().find(|p| *p != to && kind(*p) != 0)?;
-            if !is_line || kind(other) != kind(to) || self.lines.contains_key(&pair(other, to)) {
+            if kind(to) == 0 || kind(other) != kind(to) || self.lines.contains_key(&pair(other, to)) {
                 return None;
             }
         }
@@ -310,12 +311,10 @@ impl<'a> Surface<'a> {
             }
             let before = points.map(|p| self.at[p as usize]);
             let after = points.map(|p| if p == from { goal } else { self.at[p as usize] });
-            let turned = match (self.normal(before), self.normal(after)) {
-                (Some(a), Some(b)) => a.dot(b) < LEAST_TURN_COS,
-                _ => true,
-            };
-            let shape = quality(after);
-            if turned || (shape < LEAST_QUALITY && shape < quality(before)) {
+            let (a, b) = (normal(before), normal(after));
+            let (dot, least) = (a.dot(b), LEAST_TURN_COS * LEAST_TURN_COS * a.length_squared() * b.length_squared());
+            // Written so that NaN is refused.
+            if !(dot > 0.0 && dot * dot >= least) || (is_sliver(after) && !is_sliver(before)) {
                 return None;
             }
         }
@@ -348,7 +347,6 @@ impl<'a> Surface<'a> {
             self.shorten_line(*from, *to);
         }
         self.lines_at[*from as usize] = u8::MAX;
-        self.stamps[*from as usize] += 1;
     }
 
     /// A line's point is gone: the edge behind it now ends where it went.
@@ -382,8 +380,13 @@ impl<'a> Surface<'a> {
     }
 }
 
-/// How near a triangle is to an equilateral one: 1, down to 0 for one without area.
-fn quality([a, b, c]: [DVec3; 3]) -> f64 {
-    let around = a.distance_squared(b) + b.distance_squared(c) + c.distance_squared(a);
-    2.0 * 3f64.sqrt() * (b - a).cross(c - a).length() / around
+/// At right angles to a triangle, as long as twice its area.
+fn normal([a, b, c]: [DVec3; 3]) -> DVec3 {
+    (b - a).cross(c - a)
+}
+
+/// Whether a triangle's quality, its area to that of an equilateral one with the same squares of edges, is too low.
+fn is_sliver([a, b, c]: [DVec3; 3]) -> bool {
+    let around = LEAST_QUALITY * (a.distance_squared(b) + b.distance_squared(c) + c.distance_squared(a));
+    12.0 * normal([a, b, c]).length_squared() < around * around
 }

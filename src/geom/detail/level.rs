@@ -63,6 +63,11 @@ impl Level {
         }
     }
 
+    /// Without what tells of other positions: those of a rigid mesh stay as they are.
+    pub(super) fn rigid(self) -> Level {
+        Level { bounds: Vec::new(), ..self }
+    }
+
     /// Whether a vertex left out may be farther than `most` from this level of a mesh with other positions. A position that is not a
     /// number is.
     pub fn strays(&self, positions: &[Vec3], most: f64) -> bool {
@@ -122,38 +127,34 @@ impl<'a> Near<'a> {
         &self.list[self.first[p] as usize..self.first[p + 1] as usize]
     }
 
-    /// The nearest point to a vertex on the triangles around another, and from there on to neighbours as long as they are nearer; its
-    /// distance, infinite where there are no triangles.
+    /// The nearest point to a vertex on the triangles around another, and from there on to neighbours as long as it is on the rim of one
+    /// and they are nearer; its distance, infinite where there are no triangles.
     fn bound(&self, vertex: u32, merged: u32) -> (f64, Bound) {
-        let at = |v: u32| self.positions[v as usize].as_dvec3();
-        let p = at(vertex);
-        let mut best = (f64::INFINITY, None);
-        let mut look = |faces: &[u32]| {
-            let before = best.1;
-            for f in faces {
-                let corners = self.triangles[*f as usize];
-                let shares = nearest(p, corners.map(at));
-                let there = corners.iter().zip(shares).map(|(v, s)| at(*v) * s).sum::<DVec3>();
-                let d = there.distance_squared(p);
-                if d < best.0 {
-                    best = (d, Some((*f, shares)));
-                }
+        let p = self.at(vertex);
+        let mut best = (f64::INFINITY, Bound { vertex, corners: [u32::MAX; 3], shares: [f32::NAN; 3] });
+        self.around(merged).iter().for_each(|f| best = self.nearer(p, *f, best));
+        while best.1.shares.contains(&0.0) {
+            let before = best.0;
+            let ends = best.1.corners.into_iter().zip(best.1.shares).filter(|(_, share)| *share > 0.0);
+            ends.flat_map(|(v, _)| self.around(v)).for_each(|f| best = self.nearer(p, *f, best));
+            if best.0 >= before {
+                break;
             }
-            best.1.filter(|_| best.1 != before).map(|(f, _)| f)
-        };
-        let mut better = look(self.around(merged));
-        while let Some(f) = better {
-            let around: smallvec::SmallVec<[u32; 32]> =
-                self.triangles[f as usize].iter().flat_map(|v| self.around(*v)).copied().collect();
-            better = look(&around);
         }
-        match best.1 {
-            Some((f, shares)) => {
-                let (corners, shares) = (self.triangles[f as usize], shares.map(|s| s as f32));
-                (best.0.sqrt(), Bound { vertex, corners, shares })
-            }
-            None => (f64::INFINITY, Bound { vertex, corners: [u32::MAX; 3], shares: [1.0 / 3.0; 3] }),
-        }
+        (best.0.sqrt(), best.1)
+    }
+
+    /// The nearer to a point of what was found and a triangle, with the squared distance.
+    fn nearer(&self, p: DVec3, face: u32, best: (f64, Bound)) -> (f64, Bound) {
+        let corners = self.triangles[face as usize];
+        let shares = nearest(p, corners.map(|v| self.at(v)));
+        let there = corners.iter().zip(shares).map(|(v, s)| self.at(*v) * s).sum::<DVec3>();
+        let d = there.distance_squared(p);
+        if d < best.0 { (d, Bound { corners, shares: shares.map(|s| s as f32), ..best.1 }) } else { best }
+    }
+
+    fn at(&self, v: u32) -> DVec3 {
+        self.positions[v as usize].as_dvec3()
     }
 }
 

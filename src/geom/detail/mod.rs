@@ -107,7 +107,7 @@ impl Detail {
 }
 
 fn rigid_levels<'a>(levels: &'a OnceLock<Vec<Level>>, mesh: &Mesh) -> &'a [Level] {
-    levels.get_or_init(|| levels_of(&mesh.positions, &mesh.topology))
+    levels.get_or_init(|| levels_of(&mesh.positions, &mesh.topology).into_iter().map(Level::rigid).collect())
 }
 
 /// The levels of the parts of a smooth body, each with its own list of the body's vertices: the body is made coarser as a whole, so that
@@ -139,3 +139,6 @@ fn levels_of(positions: &[Vec3], topology: &Topology) -> Vec<Level> {
     let fine = Fine { positions, triangles: &topology.triangles, parts: &topology.parts, creases: &creases };
     decimate(&fine).iter().map(|step| Level::new(positions, topology, step)).collect()
 }
+
+#[cfg(test)]
+mod tests;
