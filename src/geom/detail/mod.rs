@@ -117,18 +117,23 @@ pub(super) fn levels_of_parts(positions: &[Vec3], parts: &[(&[u32], &Topology)])
     let numbers = parts.iter().zip(0u16..).flat_map(|((_, t), i)| t.triangles.iter().map(move |_| i));
     let (triangles, numbers): (Vec<_>, Vec<_>) = (triangles.collect(), numbers.collect());
     let steps = decimate(&Fine { positions, triangles: &triangles, parts: &numbers, creases: &[] });
-    let mut of_part = vec![0; positions.len()];
+    let mut of_part = vec![u32::MAX; positions.len()];
     let one = |((own, topology), number): (&(&[u32], &Topology), u16)| {
         let at: Vec<Vec3> = own.iter().map(|v| positions[*v as usize]).collect();
-        own.iter().enumerate().for_each(|(i, v)| of_part[*v as usize] = i as u32);
+        own.iter().zip(0..).for_each(|(v, i)| of_part[*v as usize] = i);
+        // Where a point joins parts that share no edge, one of them may get a vertex that it does not have: no levels from there on.
+        let mine = |v: u32| Some(of_part[v as usize]).filter(|i| *i != u32::MAX);
         let part = |step: &Step| {
             let theirs = step.triangles.iter().zip(&step.parts).filter(|(_, part)| **part == number);
-            let triangles: Vec<[u32; 3]> = theirs.map(|(t, _)| t.map(|v| of_part[v as usize])).collect();
+            let triangles = theirs.map(|([a, b, c], _)| Some([mine(*a)?, mine(*b)?, mine(*c)?]));
+            let triangles = triangles.collect::<Option<Vec<[u32; 3]>>>()?;
+            let merged = own.iter().map(|v| mine(step.merged[*v as usize])).collect::<Option<Vec<u32>>>()?;
             let parts = vec![0; triangles.len()];
-            let merged = own.iter().map(|v| of_part[step.merged[*v as usize] as usize]).collect();
-            Level::new(&at, topology, &Step { triangles, parts, creases: FxHashSet::default(), merged })
+            Some(Level::new(&at, topology, &Step { triangles, parts, creases: FxHashSet::default(), merged }))
         };
-        steps.iter().map(part).collect()
+        let levels = steps.iter().map_while(part).collect();
+        own.iter().for_each(|v| of_part[*v as usize] = u32::MAX);
+        levels
     };
     parts.iter().zip(0u16..).map(one).collect()
 }
