@@ -425,6 +425,7 @@ fn pictures_pull_where_their_score_rises() {
     let half = 0.5 * 4.4 / 64.0;
     for (likelihood, seen) in [
         ("scene.chamfer(view, sigma = s, size = 64)", Value::object(disc())),
+        ("scene.chamfer(rough, sigma = s, size = 64)", Value::object(disc())),
         ("scene.chamfer(view, sigma = s, size = 64, mode = \"sum\", symmetric = true)", Value::object(disc())),
         ("scene.contour(view, size = 64, sd = 2, truncate = 9)", Value::object(disc())),
         ("scene.mask(view, size = 256)", mask()),
@@ -443,7 +444,8 @@ fn pictures_pull_where_their_score_rises() {
              let h = linspace(-1, 1, 12);
              let vase = scene.lathe({{ y: r * h, r: r * (0.6 + 0.25 * sin(2.5 * h)) }});
              let solid = scene.centred(scene.group([vase, scene.affine(translate = [0, 2 * r, 0]) * scene.sphere(0.2)]));
-             let view = scene.render(scene.affine(translate = [x, y, 0], rotate = [t, 0.2, 0.4]) * solid);
+             let placed = scene.affine(translate = [x, y, 0], rotate = [t, 0.2, 0.4]) * solid;
+             let view = scene.render(placed); let rough = scene.render(placed, detail = 0.3);
              observe {likelihood} = photo as picture;"
         );
         let program = Program::parse(&text).unwrap().observe("photo", seen);

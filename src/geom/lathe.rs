@@ -3,11 +3,12 @@
 //! Checks what is asked for and lays out the surface as strips; `profile_path` cuts profiles into strips, `revolve` turns
 //! them. Invariant: the faces look outward, and wherever both ends are closed the mesh is watertight.
 
+use super::detail::{Detail, Turned};
 use super::mesh::MOST_TRIANGLES;
 use super::profile_path::{OuterPath, Tolerance, floor_height, inner_wall};
 use super::real::{Real, Tape};
 use super::revolve::{Strip, pull_rings, revolve};
-use super::{GeomError, Mesh};
+use super::{GeomError, Mesh, Solid};
 use glam::DVec3;
 
 /// A profile: radii at heights, upwards. Lengths in scene units.
@@ -60,9 +61,25 @@ pub(super) const SMALLEST: f64 = 1e-30;
 /// finite or above 1e6, heights that decrease, negative radii; if there are no profiles or more than 1000, more than 4096
 /// points, fewer than 3 or more than 1024 sides, more than five million triangles; if the object has no extent.
 pub fn lathe(parts: &[Profile], sides: u32, thickness: f64, caps: Caps) -> Result<Mesh, GeomError> {
+    turned(parts, sides, thickness, caps).map(|(mesh, _)| mesh)
+}
+
+/// The mesh, and what it was made of.
+fn turned(parts: &[Profile], sides: u32, thickness: f64, caps: Caps) -> Result<(Mesh, Turned), GeomError> {
     check(parts, sides, thickness)?;
     let Layout { strips, closed } = layout(parts, caps, thickness, |x| x)?;
-    Ok(revolve(&strips, sides, closed, parts.len() as u16 + 5))
+    let count = parts.len() as u16 + 5;
+    Ok((revolve(&strips, sides, closed, count), Turned::new(strips, sides, closed, count)))
+}
+
+impl Solid {
+    /// A [`lathe`] that knows coarser versions of itself.
+    ///
+    /// # Errors
+    /// As [`lathe`].
+    pub fn lathe(parts: &[Profile], sides: u32, thickness: f64, caps: Caps) -> Result<Solid, GeomError> {
+        turned(parts, sides, thickness, caps).map(|(mesh, turned)| Solid::detailed(mesh, Detail::turned(turned)))
+    }
 }
 
 /// The derivatives of something by what a lathe is made from.

@@ -37,13 +37,7 @@ struct Signature {
 
 /// Sweeps strips, each beginning where the one before ends; `closed` joins the last to the first.
 pub(super) fn revolve(strips: &[Strip], sides: u32, closed: bool, part_count: u16) -> Mesh {
-    let rising = strips.iter().flat_map(|s| &s.points).is_sorted_by(|a, b| a.1 <= b.1);
-    let signature = signature(strips, sides, closed, part_count, rising);
-    let Shared { topology, circle } = cached(signature, || {
-        let mut topology = topology(strips, sides, closed, part_count);
-        topology.encloses = rising && !topology.edges.open();
-        Shared { topology: Arc::new(topology), circle: circle(sides) }
-    });
+    let Shared { topology, circle } = shared(strips, sides, closed, part_count);
     let n = sides as usize;
     let count: usize = strips.iter().map(|s| s.points.len() * n).sum();
     let (mut positions, mut normals) = (Vec::with_capacity(count), Vec::with_capacity(count));
@@ -67,6 +61,20 @@ pub(super) fn revolve(strips: &[Strip], sides: u32, closed: bool, part_count: u1
         }
     }
     Mesh { positions, normals, topology }
+}
+
+/// The topology of [`revolve`].
+pub(super) fn topology_of(strips: &[Strip], sides: u32, closed: bool, part_count: u16) -> Arc<Topology> {
+    shared(strips, sides, closed, part_count).topology
+}
+
+fn shared(strips: &[Strip], sides: u32, closed: bool, part_count: u16) -> Shared {
+    let rising = strips.iter().flat_map(|s| &s.points).is_sorted_by(|a, b| a.1 <= b.1);
+    cached(signature(strips, sides, closed, part_count, rising), || {
+        let mut topology = topology(strips, sides, closed, part_count);
+        topology.encloses = rising && !topology.edges.open();
+        Shared { topology: Arc::new(topology), circle: circle(sides) }
+    })
 }
 
 /// From the derivatives of something by the vertices of [`revolve`] to those by each point (r, y) of the path in turn.

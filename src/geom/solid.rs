@@ -4,6 +4,7 @@
 //! Not a volume: members may overlap, nothing is cut or merged. Invariants: a member's parts are numbered after those of
 //! the members before it (numbers beyond 65534 are all drawn as that one); no two landmarks have the same name.
 
+use super::detail::{Coarse, Detail};
 use super::landmark::{Landmark, unique};
 use super::mesh::{MOST_PARTS, MOST_TRIANGLES};
 use super::{Affine, Bounds, Edge, Edges, GeomError, Mesh, NO_FACE, Topology, outer};
@@ -20,6 +21,22 @@ pub struct Instance {
     pub affine: Affine,
     /// What is added to its part numbers.
     pub first_part: u16,
+    /// Coarser versions of the mesh, where there are some.
+    pub detail: Option<Arc<Detail>>,
+}
+
+impl Instance {
+    /// The coarsest version of its mesh that is at most `error` (the mesh's units) from every vertex it leaves out; `None` if that is the
+    /// mesh itself.
+    pub fn coarse(&self, error: f64) -> Option<Arc<Coarse>> {
+        self.detail.as_ref()?.within(&self.mesh, error)
+    }
+
+    /// The centre and radius of a ball around it, in world coordinates, where it has coarser versions.
+    pub fn ball(&self) -> Option<(DVec3, f64)> {
+        let (centre, radius) = self.detail.as_ref()?.ball(&self.mesh);
+        Some((self.affine.point(centre), radius * self.affine.stretch()))
+    }
 }
 
 /// Meshes that are made when somebody first looks.
@@ -61,8 +78,24 @@ fn ready(instances: Arc<[Instance]>) -> Arc<Lazy> {
 impl Solid {
     /// A mesh as it is.
     pub fn new(mesh: Arc<Mesh>) -> Solid {
-        let instance = Instance { mesh, affine: Affine::IDENTITY, first_part: 0 };
-        Solid { instances: ready(Arc::new([instance])), landmarks: Arc::default() }
+        Solid::of(Arc::new([Instance { mesh, affine: Affine::IDENTITY, first_part: 0, detail: None }]))
+    }
+
+    /// A mesh that will be seen many times, such as a file's: coarser versions of it are worked out when a view first wants one, once for
+    /// all placements of the solid (about a second for 100,000 triangles).
+    pub fn lasting(mesh: Mesh) -> Solid {
+        Solid::detailed(mesh, Detail::rigid())
+    }
+
+    /// A mesh with coarser versions.
+    pub(super) fn detailed(mesh: Mesh, detail: Detail) -> Solid {
+        let (mesh, detail) = (Arc::new(mesh), Some(Arc::new(detail)));
+        Solid::of(Arc::new([Instance { mesh, affine: Affine::IDENTITY, first_part: 0, detail }]))
+    }
+
+    /// Placed meshes, without named points.
+    pub fn of(instances: Arc<[Instance]>) -> Solid {
+        Solid { instances: ready(instances), landmarks: Arc::default() }
     }
 
     /// The same with these named points in place of its own (world coordinates); a name that occurs again gets `#2`, `#3`, …
@@ -77,14 +110,12 @@ impl Solid {
         &self.landmarks
     }
 
-    /// Meshes as they are, each with the number of its first part; made when somebody first looks, which costs nothing where only
-    /// landmarks matter.
+    /// Placed meshes that are made when somebody first looks, which costs nothing where only landmarks matter.
     pub fn of_parts<M>(make: impl FnOnce() -> M + Send + 'static) -> Solid
     where
-        M: IntoIterator<Item = (Arc<Mesh>, u16)>,
+        M: IntoIterator<Item = Instance>,
     {
-        let instance = |(mesh, first_part)| Instance { mesh, affine: Affine::IDENTITY, first_part };
-        let lazy: Lazy = LazyLock::new(Box::new(move || make().into_iter().map(instance).collect()));
+        let lazy: Lazy = LazyLock::new(Box::new(move || make().into_iter().collect()));
         Solid { instances: Arc::new(lazy), landmarks: Arc::default() }
     }
 
@@ -112,7 +143,7 @@ impl Solid {
             first = first.saturating_add(s.part_count());
         }
         let landmarks = solids.iter().flat_map(|s| s.landmarks.iter().cloned());
-        Solid { instances: ready(instances.into()), landmarks: unique(landmarks) }
+        Solid { landmarks: unique(landmarks), ..Solid::of(instances.into()) }
     }
 
     /// The number of parts.

@@ -1,8 +1,9 @@
 //! Spheres, as meridians and rings; not subdivided solids. Invariant: every normal is the exact one of the sphere.
 
+use super::detail::{Detail, Turned};
 use super::lathe::SMALLEST;
 use super::revolve::{Strip, revolve};
-use super::{GeomError, Mesh};
+use super::{GeomError, Mesh, Solid};
 use glam::DVec3;
 
 /// A sphere round the origin with `sides` meridians and half as many rings.
@@ -10,6 +11,21 @@ use glam::DVec3;
 /// # Errors
 /// Unless the radius is from 1e-30 to 1e6, and there are 4 to 1024 sides.
 pub fn sphere(radius: f64, sides: u32) -> Result<Mesh, GeomError> {
+    turned(radius, sides).map(|(mesh, _)| mesh)
+}
+
+impl Solid {
+    /// A [`sphere`] that knows coarser versions of itself.
+    ///
+    /// # Errors
+    /// As [`sphere`].
+    pub fn sphere(radius: f64, sides: u32) -> Result<Solid, GeomError> {
+        turned(radius, sides).map(|(mesh, turned)| Solid::detailed(mesh, Detail::turned(turned)))
+    }
+}
+
+/// The mesh, and what it was made of.
+fn turned(radius: f64, sides: u32) -> Result<(Mesh, Turned), GeomError> {
     if !(SMALLEST..=1e6).contains(&radius) {
         return Err(GeomError::domain(format!("sphere: the radius must be from 1e-30 to 1e6, got {radius}")));
     }
@@ -23,11 +39,12 @@ pub fn sphere(radius: f64, sides: u32) -> Result<Mesh, GeomError> {
         (r, radius * libm::sin(angle))
     });
     let strip = Strip { points: points.collect(), parts: vec![0; rings as usize], blend: false };
-    let mut mesh = revolve(&[strip], sides, false, 1);
+    let strips = vec![strip];
+    let mut mesh = revolve(&strips, sides, false, 1);
     for (n, p) in mesh.normals.iter_mut().zip(&mesh.positions) {
         *n = p.as_dvec3().normalize_or(n.as_dvec3()).as_vec3();
     }
-    Ok(mesh)
+    Ok((mesh, Turned::new(strips, sides, false, 1)))
 }
 
 /// From the derivatives of something by the vertices of a sphere of this radius to that by the radius.

@@ -9,6 +9,7 @@ mod camera_json;
 mod contours;
 mod coverage;
 mod crossing;
+mod detail;
 mod frame;
 mod lanes;
 mod layers;

@@ -3,10 +3,11 @@
 //! Not a scene graph and not mutable: another pose is another `View`. Invariant: for one image size the frame, the depth and the
 //! contours are computed once, and every caller gets the same `Arc`.
 
+use super::detail::Drawn;
 use super::{Camera, Channels, Contours, Frame, Scene};
 use crate::geom::Solid;
 use glam::DVec3;
-use std::sync::{Arc, Mutex, PoisonError};
+use std::sync::{Arc, Mutex, MutexGuard, PoisonError};
 
 /// Values by image size; few sizes are ever asked for, so a list is enough.
 type BySize<T> = Mutex<Vec<(u32, Arc<T>)>>;
@@ -15,6 +16,8 @@ type BySize<T> = Mutex<Vec<(u32, Arc<T>)>>;
 pub struct View {
     solid: Solid,
     camera: Camera,
+    /// By how many pixels contours and depth may be off.
+    detail: f64,
     frames: BySize<Frame>,
     depths: BySize<Frame>,
     contours: BySize<Contours>,
@@ -23,7 +26,14 @@ pub struct View {
 impl View {
     /// A view; nothing is drawn yet.
     pub fn new(solid: Solid, camera: Camera) -> View {
-        View { solid, camera, frames: Mutex::default(), depths: Mutex::default(), contours: Mutex::default() }
+        View::with_detail(solid, camera, 0.0)
+    }
+
+    /// A view whose contours and depth may show meshes coarser than they are, as long as every vertex left out is within `detail` pixels
+    /// of what is drawn, whatever the size of the picture; 0 for meshes as they are.
+    pub fn with_detail(solid: Solid, camera: Camera, detail: f64) -> View {
+        let (frames, depths, contours) = (Mutex::default(), Mutex::default(), Mutex::default());
+        View { solid, camera, detail, frames, depths, contours }
     }
 
     /// The solid.
@@ -36,12 +46,13 @@ impl View {
         &self.camera
     }
 
-    /// What is drawn in the picture whose longer side has `size` pixels (0 counts as 1).
+    /// What contours and depth show in the picture whose longer side has `size` pixels (0 counts as 1).
     pub fn scene(&self, size: u32) -> Scene {
-        Scene { solid: self.solid.clone(), camera: self.camera.scaled_to(size) }
+        let camera = self.camera.scaled_to(size);
+        Scene { solid: self.drawn(&camera).solid, camera }
     }
 
-    /// All channels of the picture whose longer side has `size` pixels (0 counts as 1).
+    /// All channels of the picture whose longer side has `size` pixels (0 counts as 1), of meshes as they are.
     pub fn frame(&self, size: u32) -> Arc<Frame> {
         once(&self.frames, size, || Frame::render(&self.solid, &self.camera.scaled_to(size), Channels::All))
     }
@@ -49,30 +60,46 @@ impl View {
     /// A frame that has depth at least, in the picture whose longer side has `size` pixels (0 counts as 1): cheaper than
     /// [`View::frame`], and contours of that size that are asked for later use it.
     pub fn depth(&self, size: u32) -> Arc<Frame> {
-        match find(&self.frames.lock().unwrap_or_else(PoisonError::into_inner), size) {
-            Some(frame) => frame,
-            None => {
-                once(&self.depths, size, || Frame::render(&self.solid, &self.camera.scaled_to(size), Channels::Depth))
-            }
-        }
+        self.frame_drawn(size).unwrap_or_else(|| {
+            let camera = self.camera.scaled_to(size);
+            once(&self.depths, size, || Frame::render(&self.drawn(&camera).solid, &camera, Channels::Depth))
+        })
     }
 
     /// The contours in the picture whose longer side has `size` pixels (0 counts as 1).
     pub fn contours(&self, size: u32) -> Arc<Contours> {
         once(&self.contours, size, || {
-            let drawn = |cache: &BySize<Frame>| find(&cache.lock().unwrap_or_else(PoisonError::into_inner), size);
-            let frame = drawn(&self.frames).or_else(|| drawn(&self.depths));
+            let frame = self.frame_drawn(size).or_else(|| find(&lock(&self.depths), size));
             let camera = self.camera.scaled_to(size);
+            let solid = self.drawn(&camera).solid;
             match frame {
-                Some(frame) => Contours::with_depth(&self.solid, &camera, &frame.depth),
-                None => Contours::of(&self.solid, &camera),
+                Some(frame) => Contours::with_depth(&solid, &camera, &frame.depth),
+                None => Contours::of(&solid, &camera),
             }
         })
     }
 
-    /// The vector-Jacobian product of [`View::contours`] by the solid's vertices: [`Contours::pull`].
+    /// The vector-Jacobian product of [`View::contours`] by the solid's vertices: [`Contours::pull`], 0 for those that are not drawn.
     pub fn pull_contours(&self, size: u32, by_piece: &[[f64; 4]]) -> Vec<DVec3> {
-        self.contours(size).pull(&self.solid, &self.camera.scaled_to(size), by_piece)
+        let camera = self.camera.scaled_to(size);
+        let drawn = self.drawn(&camera);
+        drawn.by_vertices_of(&self.solid, self.contours(size).pull(&drawn.solid, &camera, by_piece))
+    }
+
+    /// How many triangles contours and depth show in the picture whose longer side has `size` pixels.
+    pub fn triangles(&self, size: u32) -> usize {
+        let drawn = self.drawn(&self.camera.scaled_to(size));
+        drawn.solid.instances().iter().map(|i| i.mesh.topology.triangles.len()).sum()
+    }
+
+    /// What contours and depth show of the solid.
+    pub(super) fn drawn(&self, camera: &Camera) -> Drawn {
+        Drawn::new(&self.solid, camera, self.detail)
+    }
+
+    /// A frame of all channels that can stand for depth, if it was drawn: that of meshes as they are, so only if they are to be drawn so.
+    fn frame_drawn(&self, size: u32) -> Option<Arc<Frame>> {
+        if self.detail > 0.0 { None } else { find(&lock(&self.frames), size) }
     }
 }
 
@@ -82,13 +109,17 @@ impl std::fmt::Debug for View {
     }
 }
 
+fn lock<T>(cache: &BySize<T>) -> MutexGuard<'_, Vec<(u32, Arc<T>)>> {
+    cache.lock().unwrap_or_else(PoisonError::into_inner)
+}
+
 fn find<T>(entries: &[(u32, Arc<T>)], size: u32) -> Option<Arc<T>> {
     entries.iter().find(|(at, _)| *at == size).map(|(_, value)| value.clone())
 }
 
 /// The entry of a size, computed under the lock when missing: a second thread waits rather than computing it again.
 fn once<T>(cache: &BySize<T>, size: u32, make: impl FnOnce() -> T) -> Arc<T> {
-    let mut entries = cache.lock().unwrap_or_else(PoisonError::into_inner);
+    let mut entries = lock(cache);
     if let Some(value) = find(&entries, size) {
         return value;
     }

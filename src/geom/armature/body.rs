@@ -8,9 +8,10 @@
 use super::morph::{Anchor, Morph};
 use super::recent;
 use super::{JointPose, RestGradient, Rig, Rules};
-use crate::geom::{GeomError, Landmark, Mesh, Solid, Topology, edges, outer};
+use crate::geom::detail::{self, Detail, Level, Levels};
+use crate::geom::{Affine, GeomError, Instance, Landmark, Mesh, Solid, Topology, edges, outer};
 use glam::{Affine3A, DAffine3, DVec3, Mat3A, Vec3, Vec3A};
-use std::sync::{Arc, LazyLock};
+use std::sync::{Arc, LazyLock, OnceLock};
 
 /// The most joints that move one vertex.
 pub const MOST_WEIGHTS: usize = 4;
@@ -59,6 +60,20 @@ pub(super) struct Skin {
     morphs: Vec<Morph>,
     /// What each keypoint follows.
     anchors: Vec<Anchor>,
+    /// The vertices before any change of shape, and coarser versions of the parts they make, by part.
+    rest: Arc<LazySurface>,
+    levels: OnceLock<Vec<Vec<Level>>>,
+}
+
+impl Levels for Skin {
+    /// Made of the whole body when first asked for, so that parts meet in the same vertices.
+    fn levels(&self, part: usize) -> &[Level] {
+        let all = self.levels.get_or_init(|| {
+            let parts = self.parts.iter().map(|p| (&*p.vertices, &*p.topology));
+            detail::levels_of_parts(&self.rest.positions, &parts.collect::<Vec<_>>())
+        });
+        all.get(part).map_or(&[], |levels| levels)
+    }
 }
 
 /// The vertices at rest, and their normals.
@@ -131,10 +146,12 @@ impl Armature {
         let parts = parts(rig.joints().len(), &triangles, &influences);
         let surface = Surface::new(positions, &triangles);
         let anchors = rig.keypoints().iter().map(|k| Anchor::of(k, &rig, &surface.positions)).collect();
-        let skin = Arc::new(Skin { triangles, influences, parts, morphs: Vec::new(), anchors });
         let lazy: LazySurface = LazyLock::new(Box::new(|| surface));
         LazyLock::force(&lazy);
-        Ok(Armature { rig, surface: Arc::new(lazy), skin })
+        let (surface, levels) = (Arc::new(lazy), OnceLock::new());
+        let rest = Arc::clone(&surface);
+        let skin = Skin { triangles, influences, parts, morphs: Vec::new(), anchors, rest, levels };
+        Ok(Armature { rig, surface, skin: Arc::new(skin) })
     }
 
     /// With offsets for its shape.
@@ -245,10 +262,7 @@ impl Armature {
             return Err(GeomError::domain("the pose takes the body too far away"));
         }
         let body = Arc::clone(self);
-        let solid = Solid::of_parts(move || {
-            let meshes = recent::meshes(&body, &single);
-            meshes.into_iter().enumerate().map(move |(i, m)| (m, body.skin.parts[i].joint))
-        });
+        let solid = Solid::of_parts(move || recent::parts(&body, &single));
         let landmarks: Vec<Landmark> = self
             .rig
             .keypoints()
@@ -284,9 +298,9 @@ impl Armature {
         &self.skin.parts
     }
 
-    /// One part's mesh under the transforms of all joints.
-    pub(super) fn skinned(&self, part: &Part, transforms: &[Affine3A]) -> Mesh {
-        let rest: &Surface = &self.surface;
+    /// A part under the transforms of all joints.
+    pub(super) fn skinned(&self, number: usize, transforms: &[Affine3A]) -> Instance {
+        let (rest, part): (&Surface, &Part) = (&self.surface, &self.skin.parts[number]);
         let (mut positions, mut normals) = (Vec::with_capacity(part.vertices.len()), Vec::new());
         normals.reserve_exact(part.vertices.len());
         for v in &part.vertices {
@@ -298,7 +312,9 @@ impl Armature {
             positions.push(m.transform_point3a(p.into()).into());
             normals.push(Vec3::from((cofactor(&m.matrix3) * Vec3A::from(n)).normalize_or(Vec3A::Y)));
         }
-        Mesh { positions, normals, topology: Arc::clone(&part.topology) }
+        let mesh = Arc::new(Mesh { positions, normals, topology: Arc::clone(&part.topology) });
+        let detail = Detail::posed(Arc::clone(&self.skin) as Arc<dyn Levels>, number);
+        Instance { mesh, affine: Affine::IDENTITY, first_part: part.joint, detail: Some(Arc::new(detail)) }
     }
 
     /// The vector-Jacobian product of posing, from the derivatives of something by the body's posed vertices (in the order of

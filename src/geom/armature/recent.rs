@@ -3,7 +3,7 @@
 //! Only saves work: what it gives equals what would be made. Sharing matters to renderers, which keep what they drew of a mesh.
 
 use super::Armature;
-use crate::geom::Mesh;
+use crate::geom::Instance;
 use glam::Affine3A;
 use std::cell::RefCell;
 use std::sync::{Arc, Weak};
@@ -12,8 +12,8 @@ use std::sync::{Arc, Weak};
 const BODIES: usize = 4;
 const POSES: usize = 4;
 
-/// What moved a part, and the mesh it made.
-type Moved = (Vec<Affine3A>, Arc<Mesh>);
+/// What moved a part, and what it made.
+type Moved = (Vec<Affine3A>, Instance);
 
 struct Known {
     body: Weak<Armature>,
@@ -26,7 +26,7 @@ thread_local! {
 }
 
 /// The mesh of each part under the transforms of all joints.
-pub(super) fn meshes(body: &Arc<Armature>, transforms: &[Affine3A]) -> Vec<Arc<Mesh>> {
+pub(super) fn parts(body: &Arc<Armature>, transforms: &[Affine3A]) -> Vec<Instance> {
     KNOWN.with_borrow_mut(|known| {
         match known.iter().position(|k| std::ptr::eq(k.body.as_ptr(), Arc::as_ptr(body))) {
             Some(i) => known[..=i].rotate_right(1),
@@ -37,18 +37,18 @@ pub(super) fn meshes(body: &Arc<Armature>, transforms: &[Affine3A]) -> Vec<Arc<M
                 known.insert(0, Known { body: Arc::downgrade(body), parts });
             }
         }
-        let parts = body.parts().iter().zip(&mut known[0].parts);
+        let parts = body.parts().iter().enumerate().zip(&mut known[0].parts);
         parts
-            .map(|(part, poses)| {
+            .map(|((i, part), poses)| {
                 let own = || part.joints.iter().map(|j| &transforms[usize::from(*j)]);
                 match poses.iter().position(|(moved, _)| moved.iter().eq(own())) {
                     Some(i) => poses[..=i].rotate_right(1),
                     None => {
                         poses.truncate(POSES - 1);
-                        poses.insert(0, (own().copied().collect(), Arc::new(body.skinned(part, transforms))));
+                        poses.insert(0, (own().copied().collect(), body.skinned(i, transforms)));
                     }
                 }
-                Arc::clone(&poses[0].1)
+                poses[0].1.clone()
             })
             .collect()
     })

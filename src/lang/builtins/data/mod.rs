@@ -18,7 +18,6 @@ use crate::lang::error::{Fault, FaultKind};
 use crate::lang::value::Value;
 use crate::vision::keypoints::{self, Keypoints, People};
 use crate::vision::{ContourMap, Limits, VisionError, depth, mask, npy, photo};
-use std::sync::Arc;
 
 const SECTION: &str = "Data files";
 
@@ -145,7 +144,7 @@ pub fn load(kind: &str, file: &str, bytes: &[u8], options: &Options, beside: &Be
             } else {
                 obj::load_in(bytes, &options.frame())
             };
-            mesh.map(|m| Value::object(SolidValue(Solid::new(Arc::new(m))))).map_err(|e: GeomError| e.to_string())
+            mesh.map(|m| Value::object(SolidValue(Solid::lasting(m)))).map_err(|e: GeomError| e.to_string())
         }
         _ => {
             let fault = Fault::type_error(format!("there is no data of type `{kind}`"));

@@ -13,6 +13,9 @@ use std::sync::Arc;
 
 const SECTION: &str = "Seeing";
 
+/// The most that contours may be off, in pixels.
+const MOST_DETAIL: f64 = 16.0;
+
 pub(super) const TABLE: &[Builtin] = &[
     native(
         "camera",
@@ -54,6 +57,14 @@ pub(super) const TABLE: &[Builtin] = &[
         &[
             arg("solid", SOLID, "What is seen."),
             opt("camera", CAMERA, "the run's", "The camera; without one, that of the run."),
+            opt(
+                "detail",
+                Type::Num,
+                "0",
+                "How far contours and silhouettes may be off, to draw meshes coarser than they are, each as its size in the picture \
+                 allows; 0 draws them as they are.",
+            )
+            .unit("pixels"),
         ],
         VIEW,
         "A solid before a camera. Nothing is drawn before a likelihood or a report looks.",
@@ -63,8 +74,13 @@ pub(super) const TABLE: &[Builtin] = &[
                 true => a.object::<CameraValue>(1, "a camera")?.0,
                 false => Camera::default_for(256, 256),
             };
-            Ok(Value::object(ViewValue(Arc::new(View::new(solid.0.clone(), camera)))))
+            let detail = a.num_or(2, 0.0)?;
+            if !(0.0..=MOST_DETAIL).contains(&detail) {
+                let message = format!("scene.render: `detail` must be from 0 to {MOST_DETAIL} pixels, got {detail}");
+                return Err(Fault::domain(message));
+            }
+            Ok(Value::object(ViewValue(Arc::new(View::with_detail(solid.0.clone(), camera, detail)))))
         },
     )
-    .pull(|_, _, by| Some(smallvec![by.clone(), Adjoint::Unknown])),
+    .pull(|_, _, by| Some(smallvec![by.clone(), Adjoint::Unknown, Adjoint::Unknown])),
 ];

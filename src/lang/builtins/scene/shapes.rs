@@ -1,7 +1,7 @@
 //! Shapes and placements.
 
 use super::{AFFINE, AffineValue, SOLID, SolidValue, fault, native, shape_pulls};
-use crate::geom::{Affine, Caps, Landmark, Profile, Solid, cuboid, lathe, sphere};
+use crate::geom::{Affine, Caps, Landmark, Profile, Solid, cuboid};
 use crate::lang::builtins::{Args, Builtin, Type, arg, opt};
 use crate::lang::error::Fault;
 use crate::lang::value::Value;
@@ -26,7 +26,7 @@ pub(super) const TABLE: &[Builtin] = &[
         "Profiles stacked and swept round the y axis; a step from one to the next is closed by a ring.",
         |a| {
             let Turned { profiles, sides, thickness, caps } = turned(a)?;
-            lathe(&profiles, sides, thickness, caps).map(solid).map_err(fault)
+            Solid::lathe(&profiles, sides, thickness, caps).map(solid).map_err(fault)
         },
     )
     .pull(shape_pulls::lathe),
@@ -41,7 +41,7 @@ pub(super) const TABLE: &[Builtin] = &[
         "A sphere round the origin.",
         |a| {
             let sides = if a.given(1) { a.int_in(1, 4, 1024)? as u32 } else { 32 };
-            sphere(a.num(0)?, sides).map(solid).map_err(fault)
+            Solid::sphere(a.num(0)?, sides).map(solid).map_err(fault)
         },
     )
     .pull(shape_pulls::sphere),
@@ -51,7 +51,7 @@ pub(super) const TABLE: &[Builtin] = &[
         &[arg("size", Type::Nums, "The three edge lengths, or one for a cube.").unit("scene units")],
         SOLID,
         "A box round the origin.",
-        |a| cuboid(vector(a, 0, DVec3::ONE)?).map(solid).map_err(fault),
+        |a| cuboid(vector(a, 0, DVec3::ONE)?).map(|m| solid(Solid::new(Arc::new(m)))).map_err(fault),
     )
     .pull(shape_pulls::cuboid),
     native("group", SECTION, &[arg("solids", Type::Array, "The solids.")], SOLID, "Several solids as one.", |a| {
@@ -128,8 +128,8 @@ pub(super) const TABLE: &[Builtin] = &[
     .pull(shape_pulls::affine),
 ];
 
-fn solid(mesh: crate::geom::Mesh) -> Value {
-    Value::object(SolidValue(Solid::new(Arc::new(mesh))))
+fn solid(solid: Solid) -> Value {
+    Value::object(SolidValue(solid))
 }
 
 /// Three numbers, or one for all; a default where left out.

@@ -1,0 +1,109 @@
+//! What levels of detail save, and what they cost in the score: triangles, time and the mean chamfer distance for several `detail`s.
+//!
+//!     cargo run --release --example detail_price [-- POSES]
+//!
+//! A lathe of the language (a new shape each time), the shipped body by its three assets (a new pose each time, skinned anew) and a mesh of
+//! 100,352 triangles (placed anew), at 128 and 256 pixels, before POSES (64) random poses that fill half to all of the picture. For each
+//! `detail` in pixels: triangles in the picture (median); processor time of an evaluation on one thread (making the shape, contours, and
+//! their mean distance from those of another pose; mean of 512, the best of three); the mean distance of contours from those with `detail`
+//! 0 (greatest); and how far rho, the mean distance from the contours of another pose, is from that with `detail` 0: median, 99th
+//! percentile, greatest. Distances in pixels, the last column in percent of the diagonal, as rho is given.
+
+mod clock;
+#[path = "detail_price/subjects.rs"]
+mod subjects;
+
+use clock::processor_seconds;
+use pcadlang::geom::Solid;
+use pcadlang::render::{Camera, View};
+use pcadlang::vision::ContourMap;
+use pcadlang::vision::chamfer::{Chamfer, ChamferOptions};
+use pcadlang::vision::elements::Elements;
+use std::error::Error;
+use subjects::Subject;
+
+const DETAILS: [f64; 6] = [0.0, 0.05, 0.1, 0.25, 0.5, 1.0];
+
+fn main() -> Result<(), Box<dyn Error>> {
+    let poses: usize = std::env::args().nth(1).and_then(|a| a.parse().ok()).unwrap_or(64);
+    println!("| mesh | pixels | `detail` | triangles | µs | contours off | rho off: median | 99 % | most | most, % |");
+    println!("| --- | --- | --- | --- | --- | --- | --- | --- | --- | --- |");
+    for subject in Subject::all()? {
+        let begun = processor_seconds();
+        view(&subject.at(0)?, 128, 1e-3).triangles(128);
+        eprintln!("{}: levels in {:.2} s", subject.name, processor_seconds() - begun);
+        for size in [128, 256] {
+            measure(&subject, size, poses)?;
+        }
+    }
+    Ok(())
+}
+
+fn measure(subject: &Subject, size: u32, poses: usize) -> Result<(), Box<dyn Error>> {
+    let mut chamfers = Vec::new();
+    for i in 0..poses {
+        let seen = map(&view(&subject.at(i)?, size, 0.0), size);
+        chamfers.push(Chamfer::prepare(&seen, size, size, &ChamferOptions::default())?);
+    }
+    // Distances from the contours of the same pose and of another.
+    let (mut exact_own, mut exact) = (Vec::new(), Vec::new());
+    for detail in DETAILS {
+        let (mut own, mut rhos, mut triangles) = (Vec::new(), Vec::new(), Vec::new());
+        for i in 0..poses {
+            let view = view(&subject.at(i)?, size, detail);
+            own.push(rho(&chamfers[i], &view, size));
+            rhos.push(rho(&chamfers[(i + 1) % poses], &view, size));
+            triangles.push(view.triangles(size) as f64);
+        }
+        let mut best = f64::INFINITY;
+        for round in 0..3 {
+            let begun = processor_seconds();
+            for i in 0..512 {
+                let solid = subject.at(i + round)?;
+                std::hint::black_box(rho(&chamfers[i % poses], &view(&solid, size, detail), size));
+            }
+            best = best.min(1e6 * (processor_seconds() - begun) / 512.0);
+        }
+        if exact.is_empty() {
+            (exact_own, exact) = (own.clone(), rhos.clone());
+        }
+        let off = |a: &[f64], b: &[f64]| a.iter().zip(b).map(|(a, b)| (a - b).abs()).collect::<Vec<f64>>();
+        let (own, off) = (off(&own, &exact_own), off(&rhos, &exact));
+        let pixels = f64::from(size) * 2f64.sqrt() / 100.0;
+        println!(
+            "| {} | {size} | {detail} | {:.0} | {best:.0} | {:.3} | {:.3} | {:.3} | {:.3} | {:.3} |",
+            subject.name,
+            quantile(&triangles, 0.5),
+            quantile(&own, 1.0) * pixels,
+            quantile(&off, 0.5) * pixels,
+            quantile(&off, 0.99) * pixels,
+            quantile(&off, 1.0) * pixels,
+            quantile(&off, 1.0),
+        );
+    }
+    Ok(())
+}
+
+fn view(solid: &Solid, size: u32, detail: f64) -> View {
+    View::with_detail(solid.clone(), Camera::default_for(size, size), detail)
+}
+
+/// The mean distance of a view's contours from others, in percent of the diagonal.
+fn rho(chamfer: &Chamfer, view: &View, size: u32) -> f64 {
+    let c = view.contours(size);
+    let elements =
+        Elements { x: &c.x, y: &c.y, tx: &c.tx, ty: &c.ty, length: &c.length, width: c.width, height: c.height };
+    chamfer.distance(&elements)
+}
+
+fn map(view: &View, size: u32) -> ContourMap {
+    let c = view.contours(size);
+    let (x, y, tx, ty) = (c.x.clone(), c.y.clone(), c.tx.clone(), c.ty.clone());
+    ContourMap { x, y, tx, ty, strength: vec![1.0; c.len()], ..ContourMap::new(size, size) }
+}
+
+fn quantile(values: &[f64], share: f64) -> f64 {
+    let mut sorted = values.to_vec();
+    sorted.sort_by(f64::total_cmp);
+    sorted.get(((sorted.len() as f64 - 1.0) * share).round() as usize).copied().unwrap_or(f64::NAN)
+}

@@ -1,0 +1,149 @@
+//! Coarser versions of meshes that keep some of their vertices, for pictures in which the difference cannot be seen.
+//!
+//! Not other shapes: a coarser version has positions and normals of the mesh itself, so what depends on its vertices is known by the
+//! mesh's. It knows how far the vertices it leaves out are from it. Invariant: which versions there are depends on how a mesh was made
+//! (a lathe's points, a file, a body at rest), never on what was asked for before.
+
+mod decimate;
+mod level;
+mod quadric;
+mod turned;
+
+use super::{Mesh, Topology};
+use decimate::{Fine, Step, decimate};
+use glam::{DVec3, Vec3};
+use rustc_hash::FxHashSet;
+use std::fmt;
+use std::sync::{Arc, Mutex, OnceLock, PoisonError};
+
+pub(super) use level::Level;
+pub(super) use turned::Turned;
+
+/// A coarser version of a mesh.
+#[derive(Debug)]
+pub struct Coarse {
+    /// It.
+    pub mesh: Arc<Mesh>,
+    /// The mesh's own vertex of each of its.
+    pub vertices: Arc<[u32]>,
+}
+
+/// Whoever has levels for meshes of one topology, or for the parts of a whole.
+pub(super) trait Levels: fmt::Debug + Send + Sync {
+    /// Those of a part, ever coarser.
+    fn levels(&self, part: usize) -> &[Level];
+}
+
+#[derive(Debug)]
+enum Source {
+    /// A mesh that stays as it is.
+    Rigid(OnceLock<Vec<Level>>),
+    /// A part in a pose.
+    Posed(Arc<dyn Levels>, usize),
+    Turned(Turned),
+}
+
+/// The coarser versions of one mesh, each made when first asked for.
+#[derive(Debug)]
+pub struct Detail {
+    source: Source,
+    /// A ball around the mesh.
+    ball: OnceLock<(DVec3, f64)>,
+    /// Those made, by number.
+    made: Mutex<Vec<((u32, usize), Arc<Coarse>)>>,
+}
+
+impl Detail {
+    fn new(source: Source) -> Detail {
+        Detail { source, ball: OnceLock::new(), made: Mutex::default() }
+    }
+
+    /// Of a mesh that will be seen many times: coarser versions are worked out once, in about a second for 100,000 triangles.
+    pub(super) fn rigid() -> Detail {
+        Detail::new(Source::Rigid(OnceLock::new()))
+    }
+
+    /// Of a part in a pose.
+    pub(super) fn posed(levels: Arc<dyn Levels>, part: usize) -> Detail {
+        Detail::new(Source::Posed(levels, part))
+    }
+
+    /// Of a surface of revolution.
+    pub(super) fn turned(turned: Turned) -> Detail {
+        Detail::new(Source::Turned(turned))
+    }
+
+    /// The coarsest version of the mesh it belongs to that is at most `error` (the mesh's units) from every vertex it leaves out; `None`
+    /// if that is the mesh itself.
+    pub(super) fn within(&self, mesh: &Mesh, error: f64) -> Option<Arc<Coarse>> {
+        let last = |levels: &[Level], fits: &dyn Fn(&Level) -> bool| levels.iter().rposition(fits).map(|i| (0, i));
+        let key = match &self.source {
+            Source::Rigid(levels) => last(rigid_levels(levels, mesh), &|level| level.deviation <= error),
+            Source::Posed(levels, part) => last(levels.levels(*part), &|level| !level.strays(&mesh.positions, error)),
+            Source::Turned(turned) => turned.steps(error).map(|s| (s.sides, s.rings)),
+        }?;
+        let mut made = self.made.lock().unwrap_or_else(PoisonError::into_inner);
+        if let Some((_, coarse)) = made.iter().find(|(k, _)| *k == key) {
+            return Some(Arc::clone(coarse));
+        }
+        let of = |level: &Level| Coarse { mesh: Arc::new(level.of(mesh)), vertices: Arc::clone(&level.vertices) };
+        let coarse = Arc::new(match &self.source {
+            Source::Rigid(levels) => of(rigid_levels(levels, mesh).get(key.1)?),
+            Source::Posed(levels, part) => of(levels.levels(*part).get(key.1)?),
+            Source::Turned(turned) => turned.coarse(mesh, turned::Steps { sides: key.0, rings: key.1 }),
+        });
+        made.push((key, Arc::clone(&coarse)));
+        Some(coarse)
+    }
+
+    /// The centre and radius of a ball around the mesh it belongs to.
+    pub(super) fn ball(&self, mesh: &Mesh) -> (DVec3, f64) {
+        *self.ball.get_or_init(|| {
+            let centre = mesh.bounds().map_or(DVec3::ZERO, |b| b.centre());
+            let far = |r: f64, p: &Vec3| r.max(p.as_dvec3().distance_squared(centre));
+            (centre, mesh.positions.iter().fold(0.0, far).sqrt())
+        })
+    }
+}
+
+fn rigid_levels<'a>(levels: &'a OnceLock<Vec<Level>>, mesh: &Mesh) -> &'a [Level] {
+    levels.get_or_init(|| levels_of(&mesh.positions, &mesh.topology).into_iter().map(Level::rigid).collect())
+}
+
+/// The levels of the parts of a smooth body, each with its own list of the body's vertices: the body is made coarser as a whole, so that
+/// parts of one level meet where they did.
+pub(super) fn levels_of_parts(positions: &[Vec3], parts: &[(&[u32], &Topology)]) -> Vec<Vec<Level>> {
+    let triangles = parts.iter().flat_map(|(own, t)| t.triangles.iter().map(|t| t.map(|v| own[v as usize])));
+    let numbers = parts.iter().zip(0u16..).flat_map(|((_, t), i)| t.triangles.iter().map(move |_| i));
+    let (triangles, numbers): (Vec<_>, Vec<_>) = (triangles.collect(), numbers.collect());
+    let steps = decimate(&Fine { positions, triangles: &triangles, parts: &numbers, creases: &[] });
+    let mut of_part = vec![u32::MAX; positions.len()];
+    let one = |((own, topology), number): (&(&[u32], &Topology), u16)| {
+        let at: Vec<Vec3> = own.iter().map(|v| positions[*v as usize]).collect();
+        own.iter().zip(0..).for_each(|(v, i)| of_part[*v as usize] = i);
+        // Where a point joins parts that share no edge, one of them may get a vertex that it does not have: no levels from there on.
+        let mine = |v: u32| Some(of_part[v as usize]).filter(|i| *i != u32::MAX);
+        let part = |step: &Step| {
+            let theirs = step.triangles.iter().zip(&step.parts).filter(|(_, part)| **part == number);
+            let triangles = theirs.map(|([a, b, c], _)| Some([mine(*a)?, mine(*b)?, mine(*c)?]));
+            let triangles = triangles.collect::<Option<Vec<[u32; 3]>>>()?;
+            let merged = own.iter().map(|v| mine(step.merged[*v as usize])).collect::<Option<Vec<u32>>>()?;
+            let parts = vec![0; triangles.len()];
+            Some(Level::new(&at, topology, &Step { triangles, parts, creases: FxHashSet::default(), merged }))
+        };
+        let levels = steps.iter().map_while(part).collect();
+        own.iter().for_each(|v| of_part[*v as usize] = u32::MAX);
+        levels
+    };
+    parts.iter().zip(0u16..).map(one).collect()
+}
+
+/// The levels of a mesh, ever coarser.
+fn levels_of(positions: &[Vec3], topology: &Topology) -> Vec<Level> {
+    let creases: Vec<[u32; 2]> = topology.edges.iter().filter(|e| e.crease).map(|e| e.vertices).collect();
+    let fine = Fine { positions, triangles: &topology.triangles, parts: &topology.parts, creases: &creases };
+    decimate(&fine).iter().map(|step| Level::new(positions, topology, step)).collect()
+}
+
+#[cfg(test)]
+mod tests;

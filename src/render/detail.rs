@@ -1,0 +1,182 @@
+//! How fine a mesh must be in a picture: the coarsest version that shows every vertex within so many pixels of where it is.
+//!
+//! The choice depends on the solid, the camera and that number alone. Meshes that reach behind the eye, or have no coarser versions, stay
+//! as they are.
+
+use super::{Camera, Projection};
+use crate::geom::{Coarse, Instance, Solid};
+use glam::DVec3;
+use std::sync::Arc;
+
+/// A solid as a picture shows it.
+pub(super) struct Drawn {
+    /// It, some of its meshes coarser.
+    pub solid: Solid,
+    coarse: Vec<Option<Arc<Coarse>>>,
+}
+
+impl Drawn {
+    /// The solid, nowhere off by more than `detail` pixels; 0 (or less, or NaN) is the solid itself.
+    pub fn new(solid: &Solid, camera: &Camera, detail: f64) -> Drawn {
+        if !(detail > 0.0) {
+            return Drawn { solid: solid.clone(), coarse: Vec::new() };
+        }
+        let find = |instance: &Instance| instance.coarse(allowed(instance, camera, detail)?);
+        let coarse: Vec<Option<Arc<Coarse>>> = solid.instances().iter().map(find).collect();
+        if coarse.iter().all(Option::is_none) {
+            return Drawn { solid: solid.clone(), coarse: Vec::new() };
+        }
+        let one = |(instance, coarse): (&Instance, &Option<Arc<Coarse>>)| match coarse {
+            Some(coarse) => Instance { mesh: Arc::clone(&coarse.mesh), detail: None, ..*instance },
+            None => instance.clone(),
+        };
+        Drawn { solid: Solid::of(solid.instances().iter().zip(&coarse).map(one).collect()), coarse }
+    }
+
+    /// From derivatives by the vertices of what is drawn to those by the solid's own: 0 for those that are not drawn.
+    pub fn by_vertices_of(&self, solid: &Solid, by_vertex: Vec<DVec3>) -> Vec<DVec3> {
+        if self.coarse.is_empty() {
+            return by_vertex;
+        }
+        let mut out = vec![DVec3::ZERO; solid.vertex_count()];
+        let (mut own, mut rest) = (&mut out[..], &by_vertex[..]);
+        for (instance, coarse) in solid.instances().iter().zip(&self.coarse) {
+            let (here, after) = own.split_at_mut(instance.mesh.positions.len());
+            let count = coarse.as_ref().map_or(here.len(), |c| c.vertices.len());
+            let (by, others) = rest.split_at(count.min(rest.len()));
+            match coarse {
+                Some(coarse) => coarse.vertices.iter().zip(by).for_each(|(v, g)| here[*v as usize] = *g),
+                None => here.iter_mut().zip(by).for_each(|(place, g)| *place = *g),
+            }
+            (own, rest) = (after, others);
+        }
+        out
+    }
+}
+
+/// How far (the mesh's units) a vertex of an instance may be from where it is to be off by so many pixels at most, wherever in the picture
+/// it is and whichever way; `None` for one that reaches behind the eye.
+fn allowed(instance: &Instance, camera: &Camera, pixels: f64) -> Option<f64> {
+    let (centre, radius) = instance.ball()?;
+    let nearest = (centre - camera.eye).dot(camera.forward) - radius;
+    let most = match camera.projection {
+        Projection::Pinhole { focal_px, cx, cy } => {
+            // Towards the corners of a picture what moves along the line of sight's axis moves in the picture, too.
+            let side = |c: f64, size: u32| c.abs().max((f64::from(size) - c).abs());
+            let slant = side(cx, camera.width).hypot(side(cy, camera.height)) / focal_px;
+            focal_px / nearest * (1.0 + slant * slant).sqrt()
+        }
+        Projection::Orthographic { units_per_pixel, .. } => 1.0 / units_per_pixel,
+    };
+    let allowed = pixels / (most * instance.affine.stretch());
+    (nearest >= Camera::NEAR && allowed > 0.0).then_some(allowed)
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+    use crate::geom::{Affine, Caps, Profile};
+    use crate::render::testing::lathe;
+    use crate::render::{Channels, Contours, Frame, View};
+
+    /// A lathe, a mesh as from a file, and a thing without coarser versions.
+    fn group() -> Solid {
+        let y: Vec<f64> = (0..25).map(|i| f64::from(i) / 12.0 - 1.0).collect();
+        let r = y.iter().map(|y| 0.5 + 0.1 * libm::sin(5.0 * y)).collect();
+        let vase = Solid::lathe(&[Profile { y, r }], 48, 0.0, Caps::Both).unwrap();
+        let fine = lathe(&[(0.3, -0.8), (0.7, -0.2), (0.65, 0.1), (0.4, 0.5), (0.6, 0.9)], 96, true);
+        let file = Solid::lasting((*fine.instances()[0].mesh).clone());
+        let at = |x: f64, turn: f64| Affine::new(DVec3::new(x, 0.0, 0.0), DVec3::new(turn, 0.3, 0.1), DVec3::ONE);
+        Solid::group(&[vase.placed(at(-1.2, 0.4)), file.placed(at(1.0, -0.3)), fine.placed(at(0.0, 0.9))])
+    }
+
+    fn triangles(solid: &Solid) -> Vec<usize> {
+        solid.instances().iter().map(|i| i.mesh.topology.triangles.len()).collect()
+    }
+
+    #[test]
+    fn what_is_far_is_coarse_and_nothing_is_without_leave() {
+        let (solid, camera) = (group(), Camera::default_for(128, 128));
+        let shown = |scale: f64, detail: f64| {
+            let by = Affine::new(DVec3::ZERO, DVec3::ZERO, DVec3::splat(scale));
+            triangles(&Drawn::new(&solid.placed(by), &camera, detail).solid)
+        };
+        for detail in [0.0, -1.0, f64::NAN] {
+            assert_eq!(shown(1.0, detail), triangles(&solid));
+        }
+        let (near, far) = (shown(1.0, 0.5), shown(0.2, 0.5));
+        assert!(near[0] < triangles(&solid)[0] && far[0] < near[0] && far[1] < triangles(&solid)[1]);
+        assert_eq!(far[2], triangles(&solid)[2], "nothing is known about this one");
+        // Around the eye nothing is made coarser.
+        assert_eq!(shown(40.0, 1.0), triangles(&solid));
+        let parallel =
+            Camera { projection: Projection::Orthographic { units_per_pixel: 0.05, cx: 64.0, cy: 64.0 }, ..camera };
+        assert!(triangles(&Drawn::new(&solid, &parallel, 0.5).solid)[0] < near[0]);
+    }
+
+    #[test]
+    fn contours_do_not_depend_on_what_was_drawn_before() {
+        let (solid, camera) = (group(), Camera::default_for(128, 128));
+        let plain = View::new(solid.clone(), camera);
+        assert_eq!(*plain.contours(128), Contours::of(&solid, &camera));
+        let view = |detail: f64| View::with_detail(solid.clone(), camera, detail);
+        assert_eq!(*view(0.0).contours(128), *plain.contours(128));
+        let wanted = view(0.5).contours(128);
+        assert_ne!(*wanted, *plain.contours(128));
+        for before in [View::frame, View::depth] {
+            let view = view(0.5);
+            before(&view, 128);
+            assert_eq!(*view.contours(128), *wanted);
+            assert_eq!(view.frame(128).depth, Frame::render(&solid, &camera, Channels::Depth).depth);
+        }
+        let other = group();
+        let there = std::thread::scope(|s| {
+            let work = || View::with_detail(other, camera, 0.5).contours(128);
+            s.spawn(work).join().unwrap()
+        });
+        assert_eq!(*there, *wanted);
+    }
+
+    #[test]
+    fn derivatives_are_by_the_vertices_of_the_solid() {
+        let camera = Camera::default_for(96, 96);
+        let parallel =
+            Camera { projection: Projection::Orthographic { units_per_pixel: 0.05, cx: 48.0, cy: 48.0 }, ..camera };
+        // Convex and apart, so that nothing is hidden at one end of a difference and seen at the other.
+        let file = Solid::lasting((*Solid::sphere(0.7, 64).unwrap().instances()[0].mesh).clone());
+        let right = Affine::new(DVec3::X, DVec3::new(0.5, 0.0, 0.2), DVec3::ONE);
+        let pair =
+            Solid::group(&[Solid::sphere(0.6, 48).unwrap().placed(right), file.placed(right.inverse().unwrap())]);
+        for camera in [camera, parallel] {
+            let at = |by: Affine| View::with_detail(pair.placed(by), camera, 0.5);
+            let view = at(Affine::IDENTITY);
+            let contours = view.contours(96);
+            let by: Vec<[f64; 4]> = contours
+                .x
+                .iter()
+                .map(|x| [0.5 + 0.1 * libm::sin(f64::from(*x)), libm::cos(f64::from(*x)), 0.7, 0.0])
+                .collect();
+            let found = view.pull_contours(96, &by);
+            assert_eq!(found.len(), view.solid().vertex_count());
+            assert!(view.triangles(96) < triangles(view.solid()).iter().sum());
+            let drawn = view.drawn(&camera);
+            let plain = contours.pull(&drawn.solid, &camera, &by);
+            let sum = |all: &[DVec3]| all.iter().map(|g| g.length_squared()).sum::<f64>();
+            assert!(sum(&found) > 0.0 && (sum(&found) - sum(&plain)).abs() < 1e-9 * sum(&plain));
+            // The same place has the same derivative: moving all by a placement moves the pieces of what is drawn.
+            for axis in [DVec3::X, DVec3::Y] {
+                let score = |h: f64| {
+                    let c = at(Affine::new(axis * h, DVec3::ZERO, DVec3::ONE)).contours(96);
+                    assert_eq!(c.len(), contours.len(), "the same pieces");
+                    let one = |(i, by): (usize, &[f64; 4])| {
+                        [c.x[i], c.y[i], c.length[i]].iter().zip(by).map(|(x, by)| f64::from(*x) * by).sum::<f64>()
+                    };
+                    by.iter().enumerate().map(one).sum::<f64>()
+                };
+                let slope = (score(1e-3) - score(-1e-3)) / 2e-3;
+                let along: f64 = found.iter().map(|g| g.dot(axis)).sum();
+                assert!((along - slope).abs() < 0.02 * along.abs() + 20.0, "{along} {slope}");
+            }
+        }
+    }
+}
