@@ -76,6 +76,7 @@ struct Sums {
 }
 
 impl Sums {
+    #[inline(always)]
     fn add(&mut self, length: f64, distance: f64) {
         self.length += length;
         self.first += length * distance;
@@ -155,6 +156,7 @@ impl Chamfer {
         -0.5 * z * z - libm::log(self.options.sigma) - LN_SQRT_2PI
     }
 
+    #[inline(always)]
     fn cut(&self, distance: f32) -> f64 {
         let d = f64::from(distance);
         self.options.truncate.map_or(d, |t| d.min(t))
@@ -177,11 +179,16 @@ impl Chamfer {
     }
 
     fn forth(&self, elements: &Elements<'_>) -> Sums {
-        let mut sums = Sums::default();
-        for e in elements.in_view() {
-            sums.add(f64::from(e.length * e.weight) * self.percent, self.cut(self.read(&e).0));
-        }
-        sums
+        vectorised(
+            #[inline(always)]
+            || {
+                let mut sums = Sums::default();
+                for e in elements.in_view() {
+                    sums.add(f64::from(e.length * e.weight) * self.percent, self.cut(self.read(&e).0));
+                }
+                sums
+            },
+        )
     }
 
     fn back(&self, elements: &Elements<'_>, scratch: &mut Scratch) -> Option<Sums> {

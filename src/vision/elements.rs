@@ -60,6 +60,7 @@ impl Elements<'_> {
     }
 
     /// The elements that are finite, have a length, and are in view at least in part.
+    #[inline(always)]
     pub(super) fn in_view(&self) -> impl Iterator<Item = Element> {
         let (w, h) = (self.width as f32, self.height as f32);
         let lists = self.x.iter().zip(self.y).zip(self.tx.iter().zip(self.ty)).zip(self.length).enumerate();

@@ -96,12 +96,14 @@ impl Edges {
     }
 
     /// Where a point of the frame lies between the grid's samples.
-    #[inline]
+    #[inline(always)]
     pub fn corners(&self, x: f32, y: f32) -> Corners {
         let (w, h) = (self.width as usize, self.height as usize);
         let gx = (x * self.sx - 0.5).clamp(0.0, (w - 1) as f32);
         let gy = (y * self.sy - 0.5).clamp(0.0, (h - 1) as f32);
-        let (x0, y0) = ((gx as usize).min(w.saturating_sub(2)), (gy as usize).min(h.saturating_sub(2)));
+        // Through 32 bits, which is one instruction.
+        let whole = |v: f32| v as i32 as usize;
+        let (x0, y0) = (whole(gx).min(w.saturating_sub(2)), whole(gy).min(h.saturating_sub(2)));
         let (x1, y1) = ((x0 + 1).min(w - 1), (y0 + 1).min(h - 1));
         Corners { at: [y0 * w + x0, y0 * w + x1, y1 * w + x0, y1 * w + x1], fx: gx - x0 as f32, fy: gy - y0 as f32 }
     }
@@ -127,7 +129,7 @@ impl Corners {
     }
 
     /// The bilinear value, and its derivatives in grid units.
-    #[inline]
+    #[inline(always)]
     pub fn read(&self, field: &[f32]) -> (f32, f32, f32) {
         let [a, b, c, d] = self.at.map(|i| field[i]);
         let (fx, fy) = (self.fx, self.fy);
