@@ -6,7 +6,7 @@
 //! 4 x 4 float32). The camera is at the origin and looks along -z, 45 degrees from top to bottom. Each evaluation has another pose.
 //! Prints one JSON line for each mesh, size and task: `depth`, `contour` (contour pieces, for us; contour pixels, for the plain one)
 //! `likelihood` (their mean distance from the contours of the last pose), and `likelihood_newmesh` (with other vertices each time
-//! too, whose normals are worked out each time; ours alone).
+//! too, whose normals are worked out each time; ours alone). `pcadlang_detail_…` are likelihoods with levels of detail.
 
 mod clock;
 #[path = "render_kit/plain.rs"]
@@ -15,7 +15,7 @@ mod plain;
 use clock::processor_seconds;
 use glam::{DAffine3, DMat3, DVec3, Vec3};
 use pcadlang::geom::{Affine, Mesh, Solid};
-use pcadlang::render::{Camera, Channels, Contours, Frame, Projection};
+use pcadlang::render::{Camera, Channels, Contours, Frame, Projection, View};
 use pcadlang::vision::chamfer::{Chamfer, ChamferOptions, Scratch};
 use pcadlang::vision::contour_map::ContourMap;
 use pcadlang::vision::elements::Elements;
@@ -167,6 +167,24 @@ fn ours(case: &Case<'_>, solid: &Solid, raw: &Raw, poses: &[Pose], last: &Pose) 
     };
     case.measure("pcadlang", "likelihood", "", |i| likelihood(&at(i)));
     let Some(mesh) = solid.instances().first().map(|i| Arc::clone(&i.mesh)) else { return Ok(()) };
+    // Not the same work: meshes as coarse as leaves every vertex within so many pixels, and how far that takes the distance.
+    let lasting = Solid::lasting((*mesh).clone());
+    for (peer, detail) in [("pcadlang_detail_0.1", 0.1), ("pcadlang_detail_0.25", 0.25)] {
+        if !(case.chosen)(peer, "likelihood") {
+            continue;
+        }
+        let view = |i: usize| View::with_detail(placed(&lasting, &poses[i % poses.len()]), camera, detail);
+        let rho = |c: &Contours| chamfer.distance(&elements(c)) * elements(c).diagonal() / 100.0;
+        let off = |i: usize| (rho(&view(i).contours(case.size)) - rho(&Contours::of(&at(i), &camera))).abs();
+        let mut off: Vec<f64> = (0..poses.len()).map(off).collect();
+        off.sort_by(f64::total_cmp);
+        let (median, most) = (off[off.len() / 2], off[off.len() - 1]);
+        let extra = format!(",\"distance_off_px_median\":{median:.3},\"distance_off_px_most\":{most:.3}");
+        case.measure(peer, "likelihood", &extra, |i| {
+            let contours = view(i).contours(case.size);
+            std::hint::black_box(chamfer.log_likelihood(&elements(&contours)));
+        });
+    }
     let shapes: Vec<Vec<Vec3>> = (0..16).map(|k| deformed(&mesh, k)).collect();
     case.measure("pcadlang", "likelihood_newmesh", "", |i| {
         let positions = shapes[i % shapes.len()].clone();

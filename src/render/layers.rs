@@ -173,6 +173,12 @@ impl Layers {
         let gone = self.shown.drain(solid.instances().len().min(self.shown.len())..);
         self.dirty.extend(gone.map(|shown| shown.area));
         self.dirty.retain(|area| area.pixels() > 0);
+        // Where much has changed, areas overlap: one around them all is less.
+        let around = self.dirty.iter().fold(Area::default(), |all, area| all.with(area));
+        if self.dirty.iter().map(Area::pixels).sum::<usize>() > around.pixels() {
+            self.dirty.clear();
+            self.dirty.push(around);
+        }
         let Layers { dirty, depth, shown, slots, .. } = self;
         for area in dirty {
             for row in area.top..area.bottom {

@@ -348,6 +348,20 @@ impl Area {
         Area { left, right, top, bottom }
     }
 
+    /// The smallest rectangle around two; one without pixels counts for nothing.
+    pub fn with(&self, other: &Area) -> Area {
+        match (self.pixels(), other.pixels()) {
+            (_, 0) => *self,
+            (0, _) => *other,
+            _ => Area {
+                left: self.left.min(other.left),
+                right: self.right.max(other.right),
+                top: self.top.min(other.top),
+                bottom: self.bottom.max(other.bottom),
+            },
+        }
+    }
+
     /// What two have in common.
     #[inline]
     pub fn common(&self, other: &Area) -> Area {
