@@ -8,6 +8,7 @@ mod camera_json;
 mod contours;
 mod crossing;
 mod frame;
+mod junctions;
 mod layers;
 mod looked;
 mod marks;
@@ -23,6 +24,7 @@ mod trace;
 mod triangle;
 mod view;
 mod visibility;
+mod wander;
 
 #[cfg(test)]
 mod extremes_tests;

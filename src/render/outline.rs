@@ -25,7 +25,7 @@ impl View {
                 [by * nx, by * ny, 0.0, 0.0]
             })
             .collect();
-        contours.pull(self.solid(), &self.camera().scaled_to(size), &by_piece)
+        contours.pull_fixed(self.solid(), &self.camera().scaled_to(size), &by_piece)
     }
 }
 

@@ -26,6 +26,8 @@ pub(super) struct Origin {
     pub at: f64,
     /// Its share of the segment's image.
     pub share: f64,
+    /// Whether the piece's tangent goes from the segment's first end to its second.
+    pub forward: bool,
 }
 
 /// Calls `out` for every piece of a mesh, in the order of its faces and edges. `vertices` are its own in the image; `fronts` is
@@ -209,12 +211,13 @@ impl<F: FnMut(Piece, &Origin)> Tracer<'_, F> {
         // Most are less than a pixel long.
         let pieces = if length < 1.5 { 1.0 } else { (length + 0.5).floor() };
         let step = (t1 - t0) / pieces;
+        let forward = dx * tangent[0] + dy * tangent[1] > 0.0;
         for i in 0..pieces as usize {
             let t = t0 + step * (i as f64 + 0.5);
             let at = [a.x + dx * t, a.y + dy * t];
             let depth = self.lens.depth(a.nearness + (b.nearness - a.nearness) * t);
             if depth.is_finite() {
-                let origin = Origin { corners: from.0, ends: from.1, at: t, share: step };
+                let origin = Origin { corners: from.0, ends: from.1, at: t, share: step, forward };
                 (self.out)(self.image.piece(at, depth, tangent, length / pieces, look, edge), &origin);
             }
         }
