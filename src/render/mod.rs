@@ -11,6 +11,7 @@ mod coverage;
 mod crossing;
 mod detail;
 mod frame;
+mod junctions;
 mod lanes;
 mod layers;
 mod looked;
@@ -27,6 +28,7 @@ mod trace;
 mod triangle;
 mod view;
 mod visibility;
+mod wander;
 
 #[cfg(test)]
 mod extremes_tests;

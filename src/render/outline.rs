@@ -25,7 +25,9 @@ impl View {
                 [by * nx, by * ny, 0.0, 0.0]
             })
             .collect();
-        self.pull_contours(size, &by_piece)
+        let camera = self.camera().scaled_to(size);
+        let drawn = self.drawn(&camera);
+        drawn.by_vertices_of(self.solid(), contours.pull_fixed(&drawn.solid, &camera, &by_piece))
     }
 }
 

@@ -1,32 +1,73 @@
 //! How contours move with the surface: from derivatives by their pieces to derivatives by the vertices.
 //!
-//! A piece moves as the points of the surface do that make its segment: for creases that is exact, for silhouettes to first
-//! order and at right angles to the contour, which is what counts. Which pieces are seen is taken as it is. Nothing is drawn:
-//! the pieces of the meshes are traced again, and those that were seen are told by their numbers.
+//! A piece moves as the points of the surface do that make its segment. That is exact for creases; smooth silhouettes also slide
+//! over faces that turn (`wander`), and contours that pass behind others become longer or shorter there (`junctions`). Nothing is
+//! drawn: the pieces of the meshes are traced again, and those that were seen are told by their numbers.
 
+use super::junctions::{End, moved_ends};
 use super::project::{Lens, Placement, Projected};
 use super::trace::{Origin, Room, trace_mesh};
 use super::visibility::Piece;
+use super::wander::{STEADY, Wander};
 use super::{Camera, Contours};
 use crate::geom::{Instance, Solid};
 use glam::DVec3;
+
+/// A piece of contour, hidden or not, and where it comes from.
+pub(super) struct Traced<'a> {
+    pub piece: Piece,
+    pub origin: Origin,
+    /// What the ends of its segment lie on.
+    pub ends: [End; 2],
+    /// Its number among those that are seen.
+    pub seen: Option<usize>,
+    instance: &'a Instance,
+    /// The instance's first vertex among all.
+    base: usize,
+}
 
 impl Contours {
     /// The vector-Jacobian product of [`Contours::of`] for the same solid and camera: from the derivatives of something by each
     /// piece's x, y, length (pixels) and angle (radians, from right to down) to those by each vertex of the solid's meshes in
     /// turn, in world coordinates. Pieces beyond the end of `by_piece` count as 0.
+    ///
+    /// Normals are taken to turn as the faces around them do. Pieces that come and go by themselves are not followed.
     pub fn pull(&self, solid: &Solid, camera: &Camera, by_piece: &[[f64; 4]]) -> Vec<DVec3> {
+        self.pull_with(solid, camera, by_piece, STEADY)
+    }
+
+    /// As [`Contours::pull`], with another angle than [`STEADY`].
+    pub(super) fn pull_with(&self, solid: &Solid, camera: &Camera, by_piece: &[[f64; 4]], steady: f64) -> Vec<DVec3> {
+        let mut traced = Vec::with_capacity(self.len() + self.len() / 4);
+        self.each(solid, camera, |t| traced.push(t));
+        let by_piece = moved_ends(&traced, camera, by_piece);
         let mut out = vec![DVec3::ZERO; solid.vertex_count()];
-        self.origins(solid, camera, |i, instance, base, origin| {
-            if let (Some(by), Some(own)) = (by_piece.get(i), out.get_mut(base..)) {
-                pull_piece(instance, camera, origin, by, own);
+        let mut wander = Wander::new(out.len(), steady);
+        for t in &traced {
+            let Some(by) = t.seen.and_then(|i| by_piece.get(i)) else { continue };
+            if let (Some(by_ends), Some(own)) = (by_ends(t, camera, by), out.get_mut(t.base..)) {
+                pull_ends(&t.origin, &by_ends, own);
+                wander.add(t.instance, camera, t.base, &t.origin, &by_ends, own);
+            }
+        }
+        wander.pull(solid, &mut out);
+        out
+    }
+
+    /// As [`Contours::pull`], with each piece held to its points of the surface.
+    pub(super) fn pull_fixed(&self, solid: &Solid, camera: &Camera, by_piece: &[[f64; 4]]) -> Vec<DVec3> {
+        let mut out = vec![DVec3::ZERO; solid.vertex_count()];
+        self.each(solid, camera, |t| {
+            let by = t.seen.and_then(|i| by_piece.get(i));
+            if let (Some(by), Some(own)) = (by.and_then(|by| by_ends(&t, camera, by)), out.get_mut(t.base..)) {
+                pull_ends(&t.origin, &by, own);
             }
         });
         out
     }
 
-    /// Calls `f` for each piece with its instance, that one's first vertex among all, and where the piece comes from.
-    fn origins(&self, solid: &Solid, camera: &Camera, mut f: impl FnMut(usize, &Instance, usize, &Origin)) {
+    /// Calls `f` for each piece in turn, hidden or not.
+    fn each<'a>(&self, solid: &'a Solid, camera: &Camera, mut f: impl FnMut(Traced<'a>)) {
         let (mut projected, mut room) = (Projected::default(), Room::default());
         let (mut next, mut base) = (0, 0);
         for instance in solid.instances() {
@@ -35,10 +76,10 @@ impl Contours {
             projected.add(&instance.mesh, &placement, &Lens::new(camera));
             let vertices = projected.mesh(0);
             trace_mesh(&instance.mesh, &placement, camera, &vertices, &mut room, |piece, origin| {
-                if self.is(next, &piece) {
-                    f(next, instance, base, origin);
-                    next += 1;
-                }
+                let seen = self.is(next, &piece).then_some(next);
+                next += usize::from(seen.is_some());
+                let ends = End::both(origin, &vertices);
+                f(Traced { piece, origin: *origin, ends, seen, instance, base });
             });
             base += vertices.len();
         }
@@ -55,15 +96,11 @@ impl Contours {
     }
 }
 
-fn pull_piece(
-    instance: &Instance,
-    camera: &Camera,
-    origin: &Origin,
-    &[gx, gy, by_length, by_angle]: &[f64; 4],
-    out: &mut [DVec3],
-) {
+/// From the derivatives by a piece to those by the ends of its segment, in world coordinates.
+fn by_ends(t: &Traced<'_>, camera: &Camera, &[gx, gy, by_length, by_angle]: &[f64; 4]) -> Option<[DVec3; 2]> {
+    let Traced { instance, origin, .. } = t;
     let corners = origin.corners.map(|v| instance.mesh.positions.get(v as usize));
-    let [Some(p), Some(q), Some(r)] = corners else { return };
+    let [Some(p), Some(q), Some(r)] = corners else { return None };
     let ends =
         origin.ends.map(|[a, b, c]| instance.affine.point(p.as_dvec3() * a + q.as_dvec3() * b + r.as_dvec3() * c));
     let [(ax, ay, a_depth), (bx, by, b_depth)] = ends.map(|e| camera.project(e));
@@ -71,20 +108,24 @@ fn pull_piece(
     let length = (dx * dx + dy * dy).sqrt();
     // A segment cut by the near plane has other ends.
     if !(a_depth >= Camera::NEAR && b_depth >= Camera::NEAR && length > 1e-9) {
-        return;
+        return None;
     }
     let (tx, ty) = (dx / length, dy / length);
     let (stretch, turn) = (by_length * origin.share, by_angle / length);
     let along = [stretch * tx - turn * ty, stretch * ty + turn * tx];
-    let by_end = [(1.0 - origin.at, -1.0), (origin.at, 1.0)];
-    for ((end, shares), (share, sign)) in ends.into_iter().zip(origin.ends).zip(by_end) {
+    let pull = |end: DVec3, share: f64, sign: f64| {
         let g = camera.pull_point(end, [share * gx + sign * along[0], share * gy + sign * along[1]]);
-        if !g.is_finite() {
-            continue;
-        }
+        if g.is_finite() { g } else { DVec3::ZERO }
+    };
+    Some([pull(ends[0], 1.0 - origin.at, -1.0), pull(ends[1], origin.at, 1.0)])
+}
+
+/// From the derivatives by the ends of a segment to those by the vertices that hold them.
+fn pull_ends(origin: &Origin, by_ends: &[DVec3; 2], out: &mut [DVec3]) {
+    for (g, shares) in by_ends.iter().zip(origin.ends) {
         for (v, share) in origin.corners.into_iter().zip(shares) {
             if let Some(place) = out.get_mut(v as usize) {
-                *place += g * share;
+                *place += *g * share;
             }
         }
     }
@@ -125,9 +166,9 @@ mod tests {
             // Angles count by length: those of short pieces turn fast.
             let one = |length: &f32| [1.0, 1.0, 1.0, f64::from(*length)].map(|by| by * (rng.next() - 0.5));
             let by: Vec<[f64; 4]> = contours.length.iter().map(one).collect();
-            let found = contours.pull(&group, &camera, &by);
+            let found = contours.pull_fixed(&group, &camera, &by);
             let mut origins = Vec::new();
-            contours.origins(&group, &camera, |i, _, base, o| origins.push((i, base, *o)));
+            contours.each(&group, &camera, |t| origins.extend(t.seen.map(|i| (i, t.base, t.origin))));
             assert!(origins.iter().map(|o| o.0).eq(0..contours.len()), "every piece was found again");
             let vertices: Vec<DVec3> = group.vertices().collect();
             for (i, base, o) in &origins {

@@ -2,7 +2,8 @@
 
 use super::project::Point;
 use crate::geom::{Mesh, Solid};
-use glam::Vec3;
+use crate::render::Contours;
+use glam::{DVec3, Vec3};
 use std::path::PathBuf;
 use std::sync::Arc;
 
@@ -116,4 +117,22 @@ pub fn cases() -> Vec<(String, PathBuf)> {
     }
     out.sort();
     out
+}
+
+/// A sum over contours of their length, weighted by a smooth function of the place, and its derivatives by the pieces.
+pub fn weighted(c: &Contours) -> (f64, Vec<[f64; 4]>) {
+    let one = |((x, y), length): ((&f32, &f32), &f32)| {
+        let [x, y, length] = [x, y, length].map(|v| f64::from(*v));
+        let weight = 1.0 + 0.004 * x + 0.002 * y + 0.2 * libm::sin(x / 25.0);
+        let slope = 0.004 + 0.008 * libm::cos(x / 25.0);
+        (weight * length, [slope * length, 0.002 * length, weight, 0.0])
+    };
+    let all: Vec<(f64, [f64; 4])> = c.x.iter().zip(&c.y).zip(&c.length).map(one).collect();
+    (all.iter().map(|a| a.0).sum(), all.iter().map(|a| a.1).collect())
+}
+
+/// The slope of something along a way, from its derivatives by the vertices and where those are before and after.
+pub fn along(by_vertex: &[DVec3], before: &Solid, after: &Solid, way: f64) -> f64 {
+    let moved = before.vertices().zip(after.vertices()).map(|(a, b)| (b - a) / way);
+    by_vertex.iter().zip(moved).map(|(g, d)| g.dot(d)).sum()
 }

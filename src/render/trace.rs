@@ -28,6 +28,8 @@ pub(super) struct Origin {
     pub at: f64,
     /// Its share of the segment's image.
     pub share: f64,
+    /// Whether the piece's tangent goes from the segment's first end to its second.
+    pub forward: bool,
 }
 
 /// What tracing needs room for. Reused from mesh to mesh.
@@ -103,7 +105,9 @@ impl<F: FnMut(Piece, &Origin)> Tracer<'_, F> {
             if length < LONGEST && self.inside(&a) && self.inside(&b) && batch.depth[i].is_finite() {
                 // Nearly all are one piece.
                 let piece = self.image.piece(middle, batch.depth[i], tangent, length, &look, false);
-                (self.out)(piece, &Origin { corners: batch.corners[i], ends: batch.weights(i), at: 0.5, share: 1.0 });
+                let (corners, ends) = (batch.corners[i], batch.weights(i));
+                let forward = (b.x - a.x) * tangent[0] + (b.y - a.y) * tangent[1] > 0.0;
+                (self.out)(piece, &Origin { corners, ends, at: 0.5, share: 1.0, forward });
             } else {
                 self.cut(&a, &b, length, tangent, &look, false, (batch.corners[i], batch.weights(i)));
             }
@@ -211,12 +215,13 @@ impl<F: FnMut(Piece, &Origin)> Tracer<'_, F> {
         }
         let pieces = if length < LONGEST { 1.0 } else { (length + 0.5).floor() };
         let step = (t1 - t0) / pieces;
+        let forward = dx * tangent[0] + dy * tangent[1] > 0.0;
         for i in 0..pieces as usize {
             let t = t0 + step * (i as f64 + 0.5);
             let at = [a.x + dx * t, a.y + dy * t];
             let depth = self.lens.depth(a.nearness + (b.nearness - a.nearness) * t);
             if depth.is_finite() {
-                let origin = Origin { corners: from.0, ends: from.1, at: t, share: step };
+                let origin = Origin { corners: from.0, ends: from.1, at: t, share: step, forward };
                 (self.out)(self.image.piece(at, depth, tangent, length / pieces, look, edge), &origin);
             }
         }

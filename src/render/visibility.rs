@@ -58,9 +58,9 @@ pub(super) struct Piece {
     pub ty: f32,
     pub length: f32,
     /// A crease or boundary, not a smooth silhouette.
-    edge: bool,
+    pub edge: bool,
     /// Scene units.
-    depth: f64,
+    pub depth: f64,
     sides: [Side; 2],
 }
 

@@ -1,0 +1,220 @@
+//! Where one contour passes behind another, and how long it is there when they move.
+//!
+//! A contour that goes on unseen behind a nearer one ends at the crossing of their images. When the nearer one moves by v and the
+//! farther by w, the end moves along the farther by (v - w) . n / (t . n), with t its tangent and n the normal of the nearer. No
+//! use of the depth image: what is seen is known, and a nearer piece that faces the end is looked for. Invariant: the order of what
+//! is added is that of the pieces.
+
+use super::Camera;
+use super::project::{Lens, Vertices};
+use super::pull::Traced;
+use super::trace::Origin;
+use rustc_hash::FxHashMap;
+
+/// How far from the last piece seen the nearer contour may be, in pixels: looks go 1.2 pixels aside and are answered by whole pixels.
+const REACH: f64 = 3.0;
+
+/// The least sine between two contours that cross. Ends on contours that nearly coincide run along them faster than is of use.
+const LEAST: f64 = 0.3;
+
+/// Hidden stretches shorter than this come and go with the pixels they are looked at by, and have no ends that move. Pixels.
+const SHORT: f64 = 3.0;
+
+/// The most pieces walked over to measure a stretch.
+const MOST: usize = 64;
+
+/// The height of a band of pieces, in pixels.
+const BAND: f64 = 4.0;
+
+/// What the end of a segment lies on: a vertex, or an edge between two, by their places in the image, which parts that share a
+/// seam have in common.
+#[derive(Clone, Copy, Debug, PartialEq, Eq, Hash)]
+pub(super) struct End([u64; 2]);
+
+impl End {
+    /// Of both ends of a segment.
+    pub fn both(origin: &Origin, vertices: &Vertices<'_>) -> [End; 2] {
+        let place = |v: u32| {
+            let p = vertices.point(v);
+            u64::from((p.x as f32).to_bits()) << 32 | u64::from((p.y as f32).to_bits())
+        };
+        let [a, b, c] = origin.corners;
+        if b == c {
+            return [a, b].map(|v| End([place(v); 2]));
+        }
+        let a = place(a);
+        [b, c].map(|v| {
+            let v = place(v);
+            End([a.min(v), a.max(v)])
+        })
+    }
+}
+
+/// For each piece, the one that follows at its end against its tangent, and the one at its end along it.
+type Links = Vec<[Option<usize>; 2]>;
+
+/// The derivatives by each piece, with those by the lengths of contours passed on to what hides their ends.
+pub(super) fn moved_ends(traced: &[Traced<'_>], camera: &Camera, by_piece: &[[f64; 4]]) -> Vec<[f64; 4]> {
+    let mut out = by_piece.to_vec();
+    if traced.iter().all(|t| t.seen.is_some()) {
+        return out;
+    }
+    let links = links(traced);
+    let bands = Bands::new(traced, camera);
+    for (j, (t, next)) in traced.iter().zip(&links).enumerate() {
+        let Some(seen) = t.seen else { continue };
+        for (side, sense) in [(0, -1.0), (1, 1.0)] {
+            let Some(hidden) = next[side].filter(|h| traced[*h].seen.is_none()) else { continue };
+            if is_short(traced, &links, hidden, j) {
+                continue;
+            }
+            let tangent = [sense * f64::from(t.piece.tx), sense * f64::from(t.piece.ty)];
+            let Some((nearer, [nx, ny])) = bands.nearer(traced, camera, t, tangent) else { continue };
+            let (Some(&[gx, gy, by_length, _]), Some(nearer)) = (by_piece.get(seen), traced[nearer].seen) else {
+                continue;
+            };
+            // What is added lies at the end of the piece, half its length from the middle.
+            let by = by_length + 0.5 * (gx * tangent[0] + gy * tangent[1]);
+            let across = tangent[0] * nx + tangent[1] * ny;
+            for (i, by) in [(nearer, by / across), (seen, -by / across)] {
+                if let Some(place) = out.get_mut(i).filter(|_| by.is_finite()) {
+                    place[0] += by * nx;
+                    place[1] += by * ny;
+                }
+            }
+        }
+    }
+    out
+}
+
+/// Where a piece ends along its tangent (1) or against it (0).
+fn end(t: &Traced<'_>, side: usize) -> [f64; 2] {
+    let by = (side as f64 - 0.5) * f64::from(t.piece.length);
+    [f64::from(t.piece.x) + by * f64::from(t.piece.tx), f64::from(t.piece.y) + by * f64::from(t.piece.ty)]
+}
+
+/// Which pieces follow each other.
+fn links(traced: &[Traced<'_>]) -> Links {
+    let mut links: Links = vec![[None; 2]; traced.len()];
+    let mut join = |[(i, a), (j, b)]: [(usize, usize); 2]| {
+        let (p, q) = (end(&traced[i], a), end(&traced[j], b));
+        // Silhouettes on both sides of a crease end on it in different places.
+        if i != j && (p[0] - q[0]).abs() + (p[1] - q[1]).abs() < 0.05 {
+            (links[i][a], links[j][b]) = (Some(j), Some(i));
+        }
+    };
+    let mut open: FxHashMap<End, (usize, usize)> = FxHashMap::default();
+    open.reserve(traced.len());
+    for (i, t) in traced.iter().enumerate() {
+        let sides = if t.origin.forward { [0, 1] } else { [1, 0] };
+        let from = t.origin.at - 0.5 * t.origin.share;
+        if let Some(before) = i.checked_sub(1).filter(|_| from > 1e-9)
+            && traced[before].origin.corners == t.origin.corners
+        {
+            join([(before, sides[1]), (i, sides[0])]);
+        }
+        for (which, at_end) in [(0, from.abs() < 1e-9), (1, (from + t.origin.share - 1.0).abs() < 1e-9)] {
+            if !at_end {
+                continue;
+            }
+            match open.remove(&t.ends[which]) {
+                Some(other) => join([other, (i, sides[which])]),
+                None => {
+                    open.insert(t.ends[which], (i, sides[which]));
+                }
+            }
+        }
+    }
+    links
+}
+
+/// Whether the hidden stretch that begins with a piece, coming from another, ends soon.
+fn is_short(traced: &[Traced<'_>], links: &Links, first: usize, from: usize) -> bool {
+    let (mut before, mut at, mut length) = (from, first, 0.0);
+    for _ in 0..MOST {
+        length += f64::from(traced[at].piece.length);
+        if length >= SHORT {
+            return false;
+        }
+        let Some(next) = links[at].iter().flatten().copied().find(|n| *n != before) else { return true };
+        if traced[next].seen.is_some() {
+            return true;
+        }
+        (before, at) = (at, next);
+    }
+    false
+}
+
+/// The pieces that are seen, by bands of the image.
+struct Bands {
+    /// Where each band begins in `pieces`, and at the end its length.
+    start: Vec<usize>,
+    pieces: Vec<usize>,
+}
+
+impl Bands {
+    fn new(traced: &[Traced<'_>], camera: &Camera) -> Bands {
+        let count = band(f64::from(camera.height)) + 1;
+        let mut start = vec![0; count + 2];
+        let seen = || traced.iter().enumerate().filter(|(_, t)| t.seen.is_some());
+        let of = |t: &Traced<'_>| band(f64::from(t.piece.y)).min(count - 1);
+        seen().for_each(|(_, t)| start[of(t) + 2] += 1);
+        (2..start.len()).for_each(|b| start[b] += start[b - 1]);
+        let mut pieces = vec![0; start[count + 1]];
+        for (i, t) in seen() {
+            let place = &mut start[of(t) + 1];
+            pieces[*place] = i;
+            *place += 1;
+        }
+        start.truncate(count + 1);
+        Bands { start, pieces }
+    }
+
+    /// The piece behind whose contour another one ends that goes on with a tangent, and its normal.
+    fn nearer(
+        &self,
+        traced: &[Traced<'_>],
+        camera: &Camera,
+        of: &Traced<'_>,
+        [tx, ty]: [f64; 2],
+    ) -> Option<(usize, [f64; 2])> {
+        let half = 0.5 * f64::from(of.piece.length);
+        let (x, y) = (f64::from(of.piece.x) + half * tx, f64::from(of.piece.y) + half * ty);
+        // At least a pixel's size nearer: not what follows on the same surface.
+        let lens = Lens::new(camera);
+        let pixel = if lens.pinhole { of.piece.depth / lens.scale } else { 1.0 / lens.scale };
+        let last = self.start.len().saturating_sub(2);
+        let range = self.start[band(y - REACH).min(last)]..self.start[(band(y + REACH) + 1).min(last + 1)];
+        let mut best = None;
+        let mut least = REACH;
+        for &k in self.pieces.get(range)? {
+            let p = &traced[k].piece;
+            let (dx, dy) = (x - f64::from(p.x), y - f64::from(p.y));
+            if dx.abs() > REACH + 1.0 || p.depth >= of.piece.depth - pixel {
+                continue;
+            }
+            let (kx, ky) = (f64::from(p.tx), f64::from(p.ty));
+            let (nx, ny) = (ky, -kx);
+            let across = tx * nx + ty * ny;
+            // Into the nearer object, whose outside is along the normal; edges have no such sense.
+            if (if p.edge { across.abs() } else { -across }) < LEAST {
+                continue;
+            }
+            let along = ((dx * kx + dy * ky).abs() - 0.5 * f64::from(p.length)).max(0.0);
+            let aside = dx * nx + dy * ny;
+            let distance = (along * along + aside * aside).sqrt();
+            if distance < least {
+                (least, best) = (distance, Some((k, [nx, ny])));
+            }
+        }
+        best
+    }
+}
+
+fn band(y: f64) -> usize {
+    (y / BAND).max(0.0) as usize
+}
+
+#[cfg(test)]
+#[path = "junctions_tests.rs"]
+mod tests;
