@@ -75,10 +75,8 @@ fn body(lod: &str) -> Result<Arc<Armature>, GeomError> {
 pub fn dense() -> Result<Mesh, GeomError> {
     let (rows, columns) = (225u32, 224u32);
     let point = |row: u32, column: u32| {
-        let (a, b) = (
-            std::f32::consts::PI * row as f32 / rows as f32,
-            std::f32::consts::TAU * column as f32 / columns as f32,
-        );
+        let (a, b) =
+            (std::f32::consts::PI * row as f32 / rows as f32, std::f32::consts::TAU * column as f32 / columns as f32);
         let way = Vec3::new(libm::sinf(a) * libm::cosf(b), libm::cosf(a), libm::sinf(a) * libm::sinf(b));
         let lumps = libm::sinf(4.0 * way.x + 1.0) * libm::sinf(5.0 * way.y) * libm::sinf(3.0 * way.z + 2.0);
         way * (1.0 + 0.25 * lumps + 0.03 * libm::sinf(17.0 * way.x) * libm::sinf(19.0 * way.y))

@@ -354,8 +354,7 @@ impl<'a> Surface<'a> {
         self.lines.remove(&pair(from, to));
         let near: SmallVec<[u32; 16]> = self.neighbours(to);
         // Neighbours of the point that went are now those of the other.
-        if let Some((other, kind)) =
-            near.iter().find_map(|p| self.lines.remove(&pair(from, *p)).map(|kind| (*p, kind)))
+        if let Some((other, kind)) = near.iter().find_map(|p| self.lines.remove(&pair(from, *p)).map(|kind| (*p, kind)))
         {
             self.lines.insert(pair(other, to), kind);
         }
