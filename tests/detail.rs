@@ -1,7 +1,7 @@
 //! What levels of detail do to the score, on a lathe, the shipped body and a dense mesh, over fixed poses.
 //!
 //! Two bounds. Of the contours themselves: their mean distance from those of meshes as they are is at most `detail`, in every pose. Of
-//! rho, the mean distance from the contours of another pose: at most three times `detail` in 99 of 100, where `detail` is at most half a
+//! rho, the mean distance from the contours of another pose: at most three times `detail` in 49 of 50, where `detail` is at most half a
 //! pixel. It is a mean over what is seen, so a fold that appears or is hidden counts with its distance from the other contours, not with
 //! how far anything moved.
 

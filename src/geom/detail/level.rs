@@ -76,8 +76,8 @@ impl Level {
         let at = |v: u32| positions.get(v as usize).copied().unwrap_or(Vec3::NAN);
         self.bounds.iter().any(|Bound { vertex, corners: [a, b, c], shares }| {
             let there = at(*a) * shares[0] + at(*b) * shares[1] + at(*c) * shares[2];
-            // Written so that NaN strays.
-            !(there.distance_squared(at(*vertex)) <= most)
+            let far = there.distance_squared(at(*vertex));
+            far > most || far.is_nan()
         })
     }
 

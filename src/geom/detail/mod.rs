@@ -43,14 +43,17 @@ enum Source {
     Turned(Turned),
 }
 
+/// Which version: 0 and the number of a level, or steps between meridians and rings.
+type Key = (u32, usize);
+
 /// The coarser versions of one mesh, each made when first asked for.
 #[derive(Debug)]
 pub struct Detail {
     source: Source,
     /// A ball around the mesh.
     ball: OnceLock<(DVec3, f64)>,
-    /// Those made, by number.
-    made: Mutex<Vec<((u32, usize), Arc<Coarse>)>>,
+    /// Those made.
+    made: Mutex<Vec<(Key, Arc<Coarse>)>>,
 }
 
 impl Detail {

@@ -46,7 +46,7 @@ impl Turned {
                 1 => 0.0,
                 _ => radius * (1.0 - libm::cos(core::f64::consts::PI * f64::from(step) / f64::from(self.sides))),
             };
-            let is_step = |step: &u32| self.sides % step == 0 && stray + sagitta(*step) <= most;
+            let is_step = |step: &u32| self.sides.is_multiple_of(*step) && stray + sagitta(*step) <= most;
             let sides = (1..=self.sides / FEWEST_SIDES.min(self.sides)).rev().find(is_step)?;
             Some(Steps { sides, rings })
         };
