@@ -1,8 +1,9 @@
 //! What one joint's change costs on the shipped body: skinning and contours at 128 pixels, for each joint, beside a full redraw.
 //!
-//!     cargo run --release --example joint_speed
+//!     cargo run --release --example joint_speed -- [LOD [JOINT]]     (such as human.lod2 hand_l; all if left out)
 //!
-//! Medians of processor-bound wall time on one thread; ratios of one run mean something, single times depend on the machine.
+//! Medians of processor-bound wall time on one thread, a full redraw and the joints by turns; ratios of one run mean something, single
+//! times depend on the machine.
 
 use glam::DVec3;
 use pcadlang::geom::armature::{Armature, JointPose, Rules, morphs_from_json, rig_from_json};
@@ -30,7 +31,9 @@ fn main() -> Result<(), GeomError> {
     let camera = Camera::default_for(128, 128);
     let place = Affine::new(DVec3::new(0.0, -1.8, 0.0), DVec3::new(0.05, 0.5, 0.0), DVec3::splat(2.1));
     let rules = Rules::default();
-    for lod in ["human.lod2", "human.lod1", "human"] {
+    let args: Vec<String> = std::env::args().skip(1).collect();
+    let chosen = |i: usize, name: &str| args.get(i).is_none_or(|wanted| wanted == name);
+    for lod in ["human.lod2", "human.lod1", "human"].into_iter().filter(|lod| chosen(0, lod)) {
         let body = body(lod)?;
         let joints = body.rig().joints();
         let draw = |pose: &[JointPose]| -> Result<f64, GeomError> {
@@ -40,26 +43,37 @@ fn main() -> Result<(), GeomError> {
             Ok(begun.elapsed().as_secs_f64() * 1e6)
         };
         // The joint turns by a little more each time, so no result can be one from before.
-        let time = |joint: usize| -> Result<f64, GeomError> {
+        let time = |joint: usize, from: usize, times: &mut Vec<f64>| -> Result<(), GeomError> {
             let mut pose = vec![JointPose::REST; joints.len()];
-            let mut times = Vec::with_capacity(REPEATS);
-            for k in 0..REPEATS {
+            for k in from..from + REPEATS {
                 pose[joint] = JointPose::turned(DVec3::new(0.1, 0.05, 0.02) * (1.0 + k as f64 * 1e-3));
                 times.push(draw(&pose)?);
             }
-            Ok(median(times))
+            Ok(())
         };
+        let wanted: Vec<usize> = (0..joints.len()).filter(|j| chosen(1, &joints[*j].name)).collect();
         // The root moves every part: a full redraw.
-        let full = time(0)?;
+        let (mut full, mut each) = (Vec::new(), vec![Vec::new(); wanted.len()]);
+        for (i, (joint, times)) in wanted.iter().zip(&mut each).enumerate() {
+            time(0, i * REPEATS, &mut full)?;
+            time(*joint, 0, times)?;
+        }
+        let full = median(full);
         println!("{lod}: {} triangles, full redraw {full:.0} us", body.triangles().len());
-        let mut all = Vec::new();
-        for (j, joint) in joints.iter().enumerate() {
-            let t = time(j)?;
-            all.push(t);
-            println!("  {:<12} {t:>6.0} us  {:>5.1} times less", joint.name, full / t);
+        let all: Vec<f64> = each.into_iter().map(median).collect();
+        for (j, t) in wanted.iter().zip(&all) {
+            println!("  {:<12} {t:>6.0} us  {:>5.1} times less", joints[*j].name, full / t);
         }
         let mean = all.iter().sum::<f64>() / all.len() as f64;
         println!("  a joint at random: {mean:.0} us, {:.1} times less than a full redraw", full / mean);
+        let ends = ["hand_l", "hand_r", "foot_l", "foot_r", "head"];
+        let ends: Vec<f64> = wanted
+            .iter()
+            .zip(&all)
+            .filter(|(j, _)| ends.contains(&&*joints[**j].name))
+            .map(|(_, t)| full / t)
+            .collect();
+        println!("  hands, feet and head: {:.1} times less (median)", median(ends));
     }
     Ok(())
 }

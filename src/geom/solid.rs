@@ -39,19 +39,19 @@ impl Instance {
     }
 }
 
-/// Meshes that are made when somebody first looks.
-type Lazy = LazyLock<Arc<[Instance]>, Box<dyn FnOnce() -> Arc<[Instance]> + Send>>;
+/// A list that is made when somebody first looks.
+type Lazy<T> = LazyLock<Arc<[T]>, Box<dyn FnOnce() -> Arc<[T]> + Send>>;
 
 /// Placed meshes.
 #[derive(Clone)]
 pub struct Solid {
-    instances: Arc<Lazy>,
-    landmarks: Arc<[Landmark]>,
+    instances: Arc<Lazy<Instance>>,
+    landmarks: Arc<Lazy<Landmark>>,
 }
 
 impl fmt::Debug for Solid {
     fn fmt(&self, f: &mut fmt::Formatter<'_>) -> fmt::Result {
-        f.debug_struct("Solid").field("instances", &self.instances()).field("landmarks", &self.landmarks).finish()
+        f.debug_struct("Solid").field("instances", &self.instances()).field("landmarks", &self.landmarks()).finish()
     }
 }
 
@@ -68,11 +68,16 @@ pub struct PlacedGradient {
     pub landmarks: Vec<DVec3>,
 }
 
-/// A solid whose meshes are there already.
-fn ready(instances: Arc<[Instance]>) -> Arc<Lazy> {
-    let lazy: Lazy = LazyLock::new(Box::new(|| instances));
+/// A list for when somebody looks.
+fn later<T: 'static>(make: impl FnOnce() -> Arc<[T]> + Send + 'static) -> Arc<Lazy<T>> {
+    Arc::new(LazyLock::new(Box::new(make)))
+}
+
+/// A list that is there already.
+fn ready<T: Send + Sync + 'static>(list: Arc<[T]>) -> Arc<Lazy<T>> {
+    let lazy = later(|| list);
     LazyLock::force(&lazy);
-    Arc::new(lazy)
+    lazy
 }
 
 impl Solid {
@@ -95,14 +100,23 @@ impl Solid {
 
     /// Placed meshes, without named points.
     pub fn of(instances: Arc<[Instance]>) -> Solid {
-        Solid { instances: ready(instances), landmarks: Arc::default() }
+        Solid { instances: ready(instances), landmarks: ready(Arc::default()) }
     }
 
     /// The same with these named points in place of its own (world coordinates); a name that occurs again gets `#2`, `#3`, …
     /// appended.
     #[must_use]
     pub fn with_landmarks(self, landmarks: impl Into<Arc<[Landmark]>>) -> Solid {
-        Solid { landmarks: unique(landmarks.into().iter().cloned()), ..self }
+        Solid { landmarks: ready(unique(landmarks.into().iter().cloned())), ..self }
+    }
+
+    /// As [`Solid::with_landmarks`], made when somebody first looks.
+    #[must_use]
+    pub fn with_landmarks_of<L>(self, make: impl FnOnce() -> L + Send + 'static) -> Solid
+    where
+        L: IntoIterator<Item = Landmark>,
+    {
+        Solid { landmarks: later(move || unique(make())), ..self }
     }
 
     /// Its named points, in world coordinates.
@@ -115,8 +129,7 @@ impl Solid {
     where
         M: IntoIterator<Item = Instance>,
     {
-        let lazy: Lazy = LazyLock::new(Box::new(move || make().into_iter().collect()));
-        Solid { instances: Arc::new(lazy), landmarks: Arc::default() }
+        Solid { instances: later(move || make().into_iter().collect()), landmarks: ready(Arc::default()) }
     }
 
     /// Its meshes.
@@ -128,8 +141,9 @@ impl Solid {
     pub fn placed(&self, by: Affine) -> Solid {
         let of = Arc::clone(&self.instances);
         let placed = move || of.iter().map(|i| Instance { affine: by * i.affine, ..i.clone() }).collect();
-        let landmarks = self.landmarks.iter().map(|l| Landmark { position: by.point(l.position), ..l.clone() });
-        Solid { instances: Arc::new(LazyLock::new(Box::new(placed))), landmarks: landmarks.collect() }
+        let of = Arc::clone(&self.landmarks);
+        let moved = move || of.iter().map(|l| Landmark { position: by.point(l.position), ..l.clone() }).collect();
+        Solid { instances: later(placed), landmarks: later(moved) }
     }
 
     /// Several together; part numbers follow one another, and so do landmarks.
@@ -142,8 +156,9 @@ impl Solid {
             }
             first = first.saturating_add(s.part_count());
         }
-        let landmarks = solids.iter().flat_map(|s| s.landmarks.iter().cloned());
-        Solid { landmarks: unique(landmarks), ..Solid::of(instances.into()) }
+        let of: Vec<_> = solids.iter().map(|s| Arc::clone(&s.landmarks)).collect();
+        let landmarks = later(move || unique(of.iter().flat_map(|landmarks| landmarks.iter().cloned())));
+        Solid { landmarks, ..Solid::of(instances.into()) }
     }
 
     /// The number of parts.

@@ -95,14 +95,16 @@ impl Crossed {
                 let Some(face) = mesh.topology.triangles.get(*face as usize) else { continue };
                 batch.set(i, first_odd(face, front), mesh, vertices, facing);
             }
-            batch.cross(placement);
+            // Whole vectors of them.
+            let lanes = faces.len().next_multiple_of(8);
+            batch.cross(placement, lanes);
             if !vertices.whole {
                 batch.cut(faces.len());
             }
             if lens.pinhole {
-                batch.draw::<true>(lens)
+                batch.draw::<true>(lens, lanes)
             } else {
-                batch.draw::<false>(lens)
+                batch.draw::<false>(lens, lanes)
             }
             if !vertices.whole {
                 batch.no_slack_behind(faces.len());
@@ -184,11 +186,11 @@ impl Batch {
 
     /// Where the silhouettes cross the sides of the faces, in camera coordinates.
     #[inline(always)]
-    fn cross(&mut self, placement: &Placement) {
+    fn cross(&mut self, placement: &Placement, lanes: usize) {
         let placement = *placement;
         let Batch { positions: [p, q, r], normals: [l, m, n], facing: [f, g, h], .. } = self;
         let (shares, camera, normal) = (&mut self.shares, &mut self.camera, &mut self.normal);
-        for i in 0..MOST {
+        for i in 0..lanes.min(MOST) {
             let (u, v) = (f[i] / (f[i] - g[i]), f[i] / (f[i] - h[i]));
             let vector = |rows: &[Row; 3]| DVec3::new(rows[0][i], rows[1][i], rows[2][i]);
             let (p, q, r) = (vector(p), vector(q), vector(r));
@@ -226,10 +228,10 @@ impl Batch {
 
     /// Where the segments are in the image.
     #[inline(always)]
-    fn draw<const PINHOLE: bool>(&mut self, lens: &Lens) {
+    fn draw<const PINHOLE: bool>(&mut self, lens: &Lens, lanes: usize) {
         let lens = Lens { pinhole: PINHOLE, ..*lens };
         let Batch { camera, normal, image, ends, length, tangent, outward, slack, middle, depth, there, .. } = self;
-        for i in 0..MOST {
+        for i in 0..lanes.min(MOST) {
             let [a, b] = camera.each_ref().map(|end| lens.point(DVec3::new(end[0][i], end[1][i], end[2][i])));
             let (dx, dy) = (b.x - a.x, b.y - a.y);
             let long = (dx * dx + dy * dy).sqrt();
@@ -255,7 +257,7 @@ impl Batch {
             (tangent[0][i], tangent[1][i]) = (way * tx, way * ty);
             (outward[0][i], outward[1][i]) = (ox, oy);
         }
-        for i in 0..MOST {
+        for i in 0..lanes.min(MOST) {
             there[i] &= (length[i] > 1e-9) & (length[i] < f64::INFINITY);
         }
     }

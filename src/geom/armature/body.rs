@@ -7,7 +7,7 @@
 
 use super::morph::{Anchor, Morph};
 use super::recent;
-use super::{JointPose, RestGradient, Rig, Rules};
+use super::{JointPose, Keypoint, RestGradient, Rig, Rules};
 use crate::geom::detail::{self, Detail, Level, Levels};
 use crate::geom::{Affine, GeomError, Instance, Landmark, Mesh, Solid, Topology, edges, outer};
 use glam::{Affine3A, DAffine3, DVec3, Mat3A, Vec3, Vec3A};
@@ -263,13 +263,15 @@ impl Armature {
         }
         let body = Arc::clone(self);
         let solid = Solid::of_parts(move || recent::parts(&body, &single));
-        let landmarks: Vec<Landmark> = self
-            .rig
-            .keypoints()
-            .iter()
-            .map(|k| Landmark { name: Arc::clone(&k.name), position: transforms[k.joint].transform_point3(k.rest) })
-            .collect();
-        Ok(solid.with_landmarks(landmarks))
+        let body = Arc::clone(self);
+        Ok(solid.with_landmarks_of(move || {
+            let keypoints = body.rig.keypoints().iter();
+            let landmark = |k: &Keypoint| Landmark {
+                name: Arc::clone(&k.name),
+                position: transforms[k.joint].transform_point3(k.rest),
+            };
+            keypoints.map(landmark).collect::<Vec<_>>()
+        }))
     }
 
     /// From the derivatives by the body at rest to that by the amount of a morph; `None` if it has no such morph.
