@@ -13,36 +13,27 @@ pub(super) struct Marks {
     reach: Vec<u8>,
     /// Entries of `reach` in a row.
     stride: usize,
+    /// Some of a row, to read from while another is written.
+    read: Vec<u8>,
+    /// The first and last columns and rows of marks; none if the first one is the larger.
+    columns: [usize; 2],
+    rows: [usize; 2],
     width: u32,
 }
 
 /// The largest side of a square that is told by one look.
 const SIDE: usize = 16;
-/// Pixels worked on at a time: long enough for loops over them to be told from code that is written out.
+/// Rows are worked on in as many pixels, which makes whole vectors of them.
 const WIDE: usize = 64;
 /// More than that.
 const FAR: u8 = SIDE as u8 + 1;
-
-/// Some entries of a row.
-#[inline(always)]
-fn chunk(row: &[u8], at: usize) -> [u8; WIDE] {
-    row.get(at..).and_then(|row| row.first_chunk()).copied().unwrap_or([FAR; WIDE])
-}
-
-/// Makes entries of a row at most others and a step more.
-#[inline(always)]
-fn nearer(row: &mut [u8], at: usize, other: [u8; WIDE], step: u8) {
-    let Some(own) = row.get_mut(at..).and_then(|row| row.first_chunk_mut::<WIDE>()) else { return };
-    for i in 0..WIDE {
-        own[i] = own[i].min(other[i] + step);
-    }
-}
 
 impl Marks {
     /// Removes all marks, for a camera's image.
     pub fn clear(&mut self, camera: &Camera) {
         self.width = camera.width;
         self.stride = (camera.width as usize).next_multiple_of(WIDE) + WIDE;
+        (self.columns, self.rows) = ([usize::MAX, 0], [usize::MAX, 0]);
         self.words.clear();
         self.words.resize(camera.pixels() / 64 + 2, 0);
         self.reach.clear();
@@ -52,7 +43,10 @@ impl Marks {
     /// Marks a pixel of the image.
     #[inline]
     pub fn set(&mut self, pixel: u32) {
-        let at = (pixel / self.width) as usize * self.stride + (pixel % self.width) as usize;
+        let [row, column] = [pixel / self.width, pixel % self.width].map(|v| v as usize);
+        let at = row * self.stride + column;
+        self.rows = [self.rows[0].min(row), self.rows[1].max(row)];
+        self.columns = [self.columns[0].min(column), self.columns[1].max(column)];
         if let (Some(word), Some(reach)) = (self.words.get_mut(pixel as usize / 64), self.reach.get_mut(at)) {
             *word |= 1 << (pixel % 64);
             *reach = 1;
@@ -61,25 +55,34 @@ impl Marks {
 
     /// To be called when all marks are set, before rectangles are asked for.
     pub fn settle(&mut self) {
-        let Marks { reach, stride, .. } = self;
+        let Marks { reach, stride, read, columns: [left, right], rows: [top, bottom], .. } = self;
+        if *top > *bottom {
+            return;
+        }
+        // Whole vectors of entries, and as many more as a look reaches.
+        let (first, stride) = (left.saturating_sub(SIDE) / WIDE * WIDE, *stride);
+        let count = (*right + 1 - first).next_multiple_of(WIDE);
+        let columns = first..first + count + SIDE;
+        read.resize(count + SIDE, FAR);
         vectorised(
             #[inline(always)]
             || {
-                let mut rows = reach.chunks_exact_mut(*stride).rev();
-                let Some(mut below) = rows.next() else { return };
-                for own in rows {
+                for row in (top.saturating_sub(SIDE)..=*bottom).rev() {
+                    let (above, below) = reach.split_at_mut((row + 1) * stride);
+                    let own = above.get_mut(row * stride..).and_then(|row| row.get_mut(columns.clone()));
+                    let (Some(own), Some(below)) = (own, below.get(columns.clone())) else { return };
                     // A square is one pixel and, a side shorter, those to the right, below, and both.
-                    for at in (0..own.len() - WIDE).step_by(WIDE) {
-                        nearer(own, at, chunk(below, at), 1);
-                        nearer(own, at, chunk(below, at + 1), 1);
+                    for ((own, down), corner) in own[..count].iter_mut().zip(&below[..count]).zip(&below[1..]) {
+                        *own = (*own).min((*down).min(*corner) + 1);
                     }
-                    for step in [1, 2, 4, 8] {
-                        // What lies to the right is not written yet.
-                        for at in (0..own.len() - WIDE).step_by(WIDE) {
-                            nearer(own, at, chunk(own, at + step), step as u8);
+                    for step in [1, 4] {
+                        read.copy_from_slice(own);
+                        let [a, b, c] = [1, 2, 3].map(|n| &read[n * step..][..count]);
+                        let more = step as u8;
+                        for (((own, a), b), c) in own[..count].iter_mut().zip(a).zip(b).zip(c) {
+                            *own = (*own).min(*a + more).min((*b + 2 * more).min(*c + 3 * more));
                         }
                     }
-                    below = own;
                 }
             },
         );
