@@ -5,7 +5,9 @@ use super::project::{Lens, Placement, Point, Vertices};
 use crate::geom::{Mesh, Patches, Topology};
 use glam::DVec3;
 
-/// Faces worked on at a time.
+/// The same for what is left in the end, and for small meshes.
+const FEW: usize = 16;
+/// Faces worked on at a time: so many, a number known beforehand, that loops over them become wide instructions.
 pub(super) const MOST: usize = 64;
 
 /// A number for each face.
@@ -95,19 +97,10 @@ impl Crossed {
                 let Some(face) = mesh.topology.triangles.get(*face as usize) else { continue };
                 batch.set(i, first_odd(face, front), mesh, vertices, facing);
             }
-            // Whole vectors of them.
-            let lanes = faces.len().next_multiple_of(8);
-            batch.cross(placement, lanes);
-            if !vertices.whole {
-                batch.cut(faces.len());
-            }
-            if lens.pinhole {
-                batch.draw::<true>(lens, lanes)
+            if faces.len() <= FEW {
+                batch.work::<FEW>(placement, lens, faces.len(), vertices.whole)
             } else {
-                batch.draw::<false>(lens, lanes)
-            }
-            if !vertices.whole {
-                batch.no_slack_behind(faces.len());
+                batch.work::<MOST>(placement, lens, faces.len(), vertices.whole)
             }
             out(batch, faces.len());
         }
@@ -184,13 +177,30 @@ impl Batch {
         }
     }
 
+    /// Works out the segments in the first `N` faces, of which `count` are set; `whole` if all of the mesh is in view.
+    #[inline(always)]
+    fn work<const N: usize>(&mut self, placement: &Placement, lens: &Lens, count: usize, whole: bool) {
+        self.cross::<N>(placement);
+        if !whole {
+            self.cut(count);
+        }
+        if lens.pinhole {
+            self.draw::<N, true>(lens)
+        } else {
+            self.draw::<N, false>(lens)
+        }
+        if !whole {
+            self.no_slack_behind(count);
+        }
+    }
+
     /// Where the silhouettes cross the sides of the faces, in camera coordinates.
     #[inline(always)]
-    fn cross(&mut self, placement: &Placement, lanes: usize) {
+    fn cross<const N: usize>(&mut self, placement: &Placement) {
         let placement = *placement;
         let Batch { positions: [p, q, r], normals: [l, m, n], facing: [f, g, h], .. } = self;
         let (shares, camera, normal) = (&mut self.shares, &mut self.camera, &mut self.normal);
-        for i in 0..lanes.min(MOST) {
+        for i in 0..N {
             let (u, v) = (f[i] / (f[i] - g[i]), f[i] / (f[i] - h[i]));
             let vector = |rows: &[Row; 3]| DVec3::new(rows[0][i], rows[1][i], rows[2][i]);
             let (p, q, r) = (vector(p), vector(q), vector(r));
@@ -228,10 +238,10 @@ impl Batch {
 
     /// Where the segments are in the image.
     #[inline(always)]
-    fn draw<const PINHOLE: bool>(&mut self, lens: &Lens, lanes: usize) {
+    fn draw<const N: usize, const PINHOLE: bool>(&mut self, lens: &Lens) {
         let lens = Lens { pinhole: PINHOLE, ..*lens };
         let Batch { camera, normal, image, ends, length, tangent, outward, slack, middle, depth, there, .. } = self;
-        for i in 0..lanes.min(MOST) {
+        for i in 0..N {
             let [a, b] = camera.each_ref().map(|end| lens.point(DVec3::new(end[0][i], end[1][i], end[2][i])));
             let (dx, dy) = (b.x - a.x, b.y - a.y);
             let long = (dx * dx + dy * dy).sqrt();
@@ -257,7 +267,7 @@ impl Batch {
             (tangent[0][i], tangent[1][i]) = (way * tx, way * ty);
             (outward[0][i], outward[1][i]) = (ox, oy);
         }
-        for i in 0..lanes.min(MOST) {
+        for i in 0..N {
             there[i] &= (length[i] > 1e-9) & (length[i] < f64::INFINITY);
         }
     }
