@@ -33,6 +33,7 @@ pub use landmark::Landmark;
 pub use lathe::{Caps, LatheGradient, Profile, lathe, pull_lathe};
 pub use mesh::{Edge, Edges, Mesh, NO_FACE, Topology};
 pub use patches::Patches;
+pub(crate) use patches::Run;
 pub use solid::{Instance, PlacedGradient, Solid};
 pub use sphere::{pull_sphere, sphere};
 

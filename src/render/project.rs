@@ -7,7 +7,7 @@ use super::place::{Extent, Place, place, rounded};
 use super::simd::vectorised;
 use super::triangle::Triangle;
 use super::{Camera, Projection};
-use crate::geom::{Affine, Mesh, Solid, Topology};
+use crate::geom::{Affine, Mesh, Run, Solid, Topology};
 use glam::{DMat3, DVec3, Vec3};
 
 /// Vertices worked on at a time: loops over them are long enough to be told from code that is written out, and short enough for
@@ -314,19 +314,16 @@ impl Vertices<'_> {
 
     /// Width and height together of what lies around some vertices, in pixels.
     pub fn span(&self, of: impl Iterator<Item = u32>) -> f32 {
-        let least = self.least_among(of);
+        let places = of.filter_map(|v| self.places.get(v as usize));
+        let least = places.fold(Place::INFINITY, |a, b| a.min(*b));
         -(least.x + least.y + least.z + least.w)
-    }
-
-    #[inline(always)]
-    fn least_among(&self, of: impl Iterator<Item = u32>) -> Place {
-        of.filter_map(|v| self.places.get(v as usize)).fold(Place::INFINITY, |a, b| a.min(*b))
     }
 
     /// The least coordinates of some rounded positions.
     #[inline(always)]
-    pub fn least(&self, of: &[u32]) -> Place {
-        self.least_among(of.iter().copied())
+    pub fn least(&self, of: &[Run]) -> Place {
+        let places = of.iter().filter_map(|run| self.places.get(run.range())).flatten();
+        places.fold(Place::INFINITY, |a, b| a.min(*b))
     }
 
     /// The least coordinates of all rounded positions.
@@ -370,8 +367,8 @@ pub(super) fn project(solid: &Solid, camera: &Camera, out: &mut Projected) -> De
 pub(super) struct Fronts {
     /// Positive where the outward normal faces the eye, zero at right angles to the line of sight; linear in the position.
     pub facing: Vec<f64>,
-    /// Whether it is not negative.
-    pub front: Vec<bool>,
+    /// 1 where it is not negative, else 0; there are [`Run::MOST`] more entries than vertices.
+    pub front: Vec<u8>,
 }
 
 impl Fronts {
@@ -381,7 +378,7 @@ impl Fronts {
         let count = mesh.positions.len().min(mesh.normals.len());
         let room = count.next_multiple_of(LANES);
         facing.resize(room, 0.0);
-        front.resize(room, false);
+        front.resize(room + LANES, 0);
         let Placement { view, bend, .. } = *placement;
         vectorised(
             #[inline(always)]
@@ -395,13 +392,13 @@ impl Fronts {
                             + nz[i] * (view.z - pz[i] * bend);
                     }
                     for i in 0..LANES {
-                        front[i] = facing[i] >= 0.0;
+                        front[i] = u8::from(facing[i] >= 0.0);
                     }
                 }
             },
         );
         facing.truncate(count);
-        front.truncate(count);
+        front.truncate(count + Run::MOST);
     }
 }
 

@@ -2,13 +2,16 @@
 
 use super::Camera;
 use super::project::{Lens, Placement, Point, Vertices};
-use crate::geom::{Mesh, Patches, Topology};
+use crate::geom::{Mesh, Patches, Run, Topology};
 use glam::DVec3;
 
 /// The same for what is left in the end, and for small meshes.
 const FEW: usize = 16;
 /// Faces worked on at a time: so many, a number known beforehand, that loops over them become wide instructions.
 pub(super) const MOST: usize = 64;
+
+/// As many bytes as vertices in the longest run, each 1.
+const EACH: u128 = u128::MAX / 255;
 
 /// A number for each face.
 type Row = [f64; MOST];
@@ -87,7 +90,7 @@ impl Crossed {
         placement: &Placement,
         lens: &Lens,
         vertices: &Vertices<'_>,
-        (facing, front): (&[f64], &[bool]),
+        (facing, front): (&[f64], &[u8]),
         mut out: impl FnMut(&Batch, usize),
     ) {
         self.find(&mesh.topology, front);
@@ -108,7 +111,7 @@ impl Crossed {
 
     /// Finds the faces whose corners do not all have the same sign.
     #[inline(always)]
-    fn find(&mut self, topology: &Topology, front: &[bool]) {
+    fn find(&mut self, topology: &Topology, front: &[u8]) {
         let (triangles, patches) = (&topology.triangles, topology.patches.of(&topology.triangles));
         if self.faces.len() < triangles.len() {
             self.faces.resize(triangles.len(), 0);
@@ -117,9 +120,11 @@ impl Crossed {
         let mut count = 0;
         for (i, (patch, triangles)) in patches.zip(triangles.chunks(Patches::FACES)).enumerate() {
             let (mut some, mut all) = (false, true);
-            for v in patch {
-                let front = front.get(*v as usize).copied().unwrap_or_default();
-                (some, all) = (some | front, all & front);
+            for run in patch {
+                let Some(bytes) = front.get(run.first..).and_then(|front| front.first_chunk()) else { continue };
+                let wanted = EACH >> (8 * (Run::MOST - run.count));
+                let own = u128::from_le_bytes(*bytes) & wanted;
+                (some, all) = (some | (own != 0), all & (own == wanted));
             }
             if some == all {
                 continue;
@@ -130,7 +135,7 @@ impl Crossed {
                 if let Some(place) = faces.get_mut(count) {
                     *place = face as u32;
                 }
-                count += usize::from((a ^ b) | (a ^ c));
+                count += usize::from((a ^ b) | (a ^ c) != 0);
             }
         }
         self.count = count;
@@ -139,7 +144,7 @@ impl Crossed {
 
 /// The corners of a face from the one on that differs from the two others.
 #[inline(always)]
-fn first_odd(&[a, b, c]: &[u32; 3], front: &[bool]) -> [u32; 3] {
+fn first_odd(&[a, b, c]: &[u32; 3], front: &[u8]) -> [u32; 3] {
     let front = |v: u32| front.get(v as usize).copied().unwrap_or_default();
     match (front(a) == front(b), front(a) == front(c)) {
         (true, _) => [c, a, b],
