@@ -4,8 +4,9 @@
 //! finite exactly where something is seen; the other channels have as many entries or, when not asked for, none.
 
 use super::Camera;
+use super::candidates::Candidates;
 use super::project::{Lens, Projected, project};
-use super::raster::{Candidates, draw_nearness, each_triangle, empty};
+use super::raster::{draw_nearness, each_triangle, empty};
 use super::simd::vectorised;
 use crate::geom::Solid;
 use glam::{DVec3, Vec3};

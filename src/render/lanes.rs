@@ -63,15 +63,15 @@ impl Batch {
         back: i32,
         mut draw: impl FnMut(&Batch, usize, u32, &Extent, Kind),
     ) {
-        loop {
+        let mut more = true;
+        while more {
             self.count = 0;
+            more = false;
             for (face, extent) in list.by_ref().take(MOST) {
+                more = true;
                 if let Some(places) = places(face) {
                     self.add(face, extent, places, right);
                 }
-            }
-            if self.count == 0 {
-                return;
             }
             self.solve(back);
             for i in 0..self.count.min(MOST) {

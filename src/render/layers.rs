@@ -6,10 +6,11 @@
 //! Invariant: a layer is a function of mesh, placement and camera alone, and 1 / q falls as q grows, in `f32` too, so the
 //! nearest of the layers' depths is the depth drawn at once, and the contours are those drawn at once, bit for bit.
 
+use super::candidates::Candidates;
 use super::contours::Contours;
 use super::frame::to_depth;
 use super::project::{DepthRange, Lens, Placement, Projected};
-use super::raster::{Area, Candidates, draw_mesh};
+use super::raster::{Area, draw_mesh};
 use super::simd::vectorised;
 use super::trace::{Room, trace_mesh};
 use super::visibility::{BESIDE, Depths, Piece};

@@ -3,10 +3,11 @@
 //! Invariant: what is read of a pixel that was marked is what the whole depth image has there, bit for bit.
 
 use super::Camera;
+use super::candidates::Candidates;
 use super::frame::depth_of;
 use super::marks::Marks;
 use super::project::{Lens, Placement, Projected};
-use super::raster::{Candidates, empty, fill_some};
+use super::raster::{empty, fill_some};
 use super::triangle::bits;
 use crate::geom::Solid;
 

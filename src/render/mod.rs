@@ -6,6 +6,7 @@
 mod batch;
 mod camera;
 mod camera_json;
+mod candidates;
 mod contours;
 mod coverage;
 mod crossing;

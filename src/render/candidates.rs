@@ -1,0 +1,124 @@
+//! Which triangles of a mesh may show in a picture, or at its marked pixels, and drawing those.
+//!
+//! Nothing is decided by branches that could not be foretold: lists are written branch-free, and triangles set up many at a time.
+
+use super::coverage::is_turned;
+use super::lanes::{Batch, Kind, LANES};
+use super::marks::Marks;
+use super::place::Extent;
+use super::project::Vertices;
+use super::raster::Area;
+use super::triangle::Plane;
+use crate::geom::{Patches, Topology};
+use glam::Vec4;
+
+/// The triangles of meshes that have pixels' centres between their corners, with where. Reused from picture to picture.
+#[derive(Default)]
+pub(super) struct Candidates {
+    faces: Vec<u32>,
+    extents: Vec<Extent>,
+    count: usize,
+    batch: Batch,
+}
+
+impl Candidates {
+    /// Those of one mesh all of whose vertices are in view, but for backs that need not be drawn; with marks, those that reach some.
+    #[inline(always)]
+    fn find(&mut self, topology: &Topology, vertices: &Vertices<'_>, size: Vec4, back: f64, marks: Option<&Marks>) {
+        let triangles = &topology.triangles;
+        if self.faces.len() < triangles.len() {
+            self.faces.resize(triangles.len(), 0);
+            self.extents.resize(triangles.len(), Extent::default());
+        }
+        self.count = 0;
+        let Some(marks) = marks else {
+            return self.add(0, triangles, vertices, size, back, |_| true);
+        };
+        for (i, (patch, triangles)) in topology.patches.of(triangles).zip(triangles.chunks(Patches::FACES)).enumerate()
+        {
+            let extent = Extent::between(vertices.least(patch), size);
+            if !extent.is_empty() && marks.hold(extent.ends()) {
+                self.add(i * Patches::FACES, triangles, vertices, size, back, |ends| marks.may_hold(ends));
+            }
+        }
+        let found = std::mem::take(&mut self.count);
+        for i in 0..found {
+            let (Some(&face), Some(&extent)) = (self.faces.get(i), self.extents.get(i)) else { continue };
+            self.put(face, extent, marks.hold(extent.ends()));
+        }
+    }
+
+    /// Adds the candidates among some triangles, of which the first one is face `first`.
+    #[inline(always)]
+    fn add(
+        &mut self,
+        first: usize,
+        triangles: &[[u32; 3]],
+        vertices: &Vertices<'_>,
+        size: Vec4,
+        back: f64,
+        wanted: impl Fn([[usize; 2]; 2]) -> bool,
+    ) {
+        for (i, corners) in triangles.iter().enumerate() {
+            let Some(places) = vertices.places(corners) else { continue };
+            let extent = Extent::around(places, size);
+            let turned = back != 0.0 && is_turned(places, back);
+            self.put((first + i) as u32, extent, !extent.is_empty() & !turned & wanted(extent.ends()));
+        }
+    }
+
+    /// Each is written down, and written over unless it counts: a branch could not be foretold.
+    #[inline(always)]
+    fn put(&mut self, face: u32, extent: Extent, counts: bool) {
+        if let (Some(f), Some(e)) = (self.faces.get_mut(self.count), self.extents.get_mut(self.count)) {
+            (*f, *e) = (face, extent);
+        }
+        self.count += usize::from(counts);
+    }
+
+    /// Keeps the nearer of a mesh's triangles and what is there, in the rows of an area; with marks, at marked pixels at least.
+    #[inline(always)]
+    pub fn fill(
+        &mut self,
+        topology: &Topology,
+        vertices: &Vertices<'_>,
+        (size, back): (Vec4, f64),
+        area: &Area,
+        marks: Option<&Marks>,
+        buffer: &mut [f32],
+    ) {
+        self.find(topology, vertices, size, back, marks);
+        let (width, columns) = (area.right - area.left, [area.left, area.right]);
+        let large = |face: u32, extent: Extent, buffer: &mut [f32]| {
+            if let Some(triangle) = vertices.triangle(topology, face, extent, back) {
+                match marks {
+                    Some(marks) => triangle.fill_some(buffer, width, marks),
+                    None => triangle.fill(buffer, columns, area.top),
+                }
+            }
+        };
+        let Candidates { faces, extents, count, batch } = self;
+        let list = faces[..*count].iter().copied().zip(extents[..*count].iter().copied());
+        if width < LANES {
+            return list.for_each(|(face, extent)| large(face, extent, buffer));
+        }
+        let places = |face: u32| vertices.places(topology.triangles.get(face as usize)?);
+        let back = back as i32;
+        batch.each(list, places, area.right, back, |batch, i, face, extent, kind| {
+            if kind == Kind::Large {
+                return large(face, *extent, buffer);
+            }
+            let mut plane = None;
+            batch.rows(i, extent, area.right, |row, from, outside| {
+                let at = (row - area.top) * width + from - area.left;
+                if marks.is_some_and(|marks| marks.window(at, LANES) as u32 & !outside.to_bitmask() == 0) {
+                    return;
+                }
+                let corners = || Plane::new(&vertices.corners(topology, face), extent.ends()[0][0]);
+                if let Some(plane) = plane.get_or_insert_with(corners) {
+                    plane.keep(buffer, at, row, from, outside);
+                }
+            });
+        });
+    }
+}
