@@ -149,7 +149,7 @@ mod tests {
         let mut one = |i: usize| {
             let turn = DVec3::from_array([(); 3].map(|()| random.between(-1.0, 1.0)));
             // Some are out of view.
-            let at = DVec3::new(if i % 7 == 0 { 50.0 } else { random.between(-0.5, 0.5) }, 0.0, 0.0);
+            let at = DVec3::new(if i.is_multiple_of(7) { 50.0 } else { random.between(-0.5, 0.5) }, 0.0, 0.0);
             let solid = shapes[i % 2].placed(Affine::new(at, turn, DVec3::ONE));
             Scene { solid, camera: Camera::default_for(40 + (i as u32 % 3) * 20, 50) }
         };
