@@ -6,7 +6,8 @@
 mod common;
 
 use common::parts::{BODY, spindle};
-use common::{dense, human, lathe, pose, short, standing, vase};
+use common::shipped::human;
+use common::{dense, lathe, pose, short, standing, vase};
 use criterion::{BatchSize, Criterion, criterion_group, criterion_main};
 use glam::{DVec3, Vec3};
 use pcadlang::geom::armature::{JointPose, Rules};

@@ -5,21 +5,13 @@
 //! Medians of processor-bound wall time on one thread, a full redraw and the joints by turns; ratios of one run mean something, single
 //! times depend on the machine.
 
-use glam::DVec3;
-use pcadlang::geom::armature::{Armature, JointPose, Rules, morphs_from_json, rig_from_json};
-use pcadlang::geom::{Affine, GeomError, obj};
-use pcadlang::lang::load::embedded;
-use pcadlang::render::{Camera, View};
-use std::sync::Arc;
-use std::time::Instant;
+mod shipped;
 
-fn body(lod: &str) -> Result<Arc<Armature>, GeomError> {
-    let file = |end: &str| embedded(&format!("std/human/{lod}.{end}")).unwrap_or_default().as_bytes();
-    let rig = rig_from_json(file("rig.json"))?;
-    let mesh = obj::indexed(file("obj"))?;
-    let morphs = morphs_from_json(file("morphs.json"), &rig.rig)?;
-    Ok(Arc::new(Armature::new(rig.rig, mesh.positions, mesh.triangles, rig.influences)?.with_morphs(morphs)?))
-}
+use glam::DVec3;
+use pcadlang::geom::armature::{JointPose, Rules};
+use pcadlang::geom::{Affine, GeomError};
+use pcadlang::render::{Camera, View};
+use std::time::Instant;
 
 fn median(mut xs: Vec<f64>) -> f64 {
     xs.sort_by(f64::total_cmp);
@@ -34,7 +26,7 @@ fn main() -> Result<(), GeomError> {
     let args: Vec<String> = std::env::args().skip(1).collect();
     let chosen = |i: usize, name: &str| args.get(i).is_none_or(|wanted| wanted == name);
     for lod in ["human.lod2", "human.lod1", "human"].into_iter().filter(|lod| chosen(0, lod)) {
-        let body = body(lod)?;
+        let body = shipped::human(lod)?;
         let joints = body.rig().joints();
         let draw = |pose: &[JointPose]| -> Result<f64, GeomError> {
             let begun = Instant::now();

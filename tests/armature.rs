@@ -2,21 +2,18 @@
 //!
 //! `data/mocap_poses.csv` holds two poses obtained from mocap.cs.cmu.edu (funded by NSF EIA-0196217), retargeted to the rig.
 
+#[path = "../examples/shipped/mod.rs"]
+mod shipped;
+
 use glam::{DAffine3, DVec3};
-use pcadlang::geom::armature::{Armature, JointPose, Rules, Stretch, Turn, morphs_from_json, rig_from_json};
-use pcadlang::geom::{Affine, obj};
-use pcadlang::lang::load::embedded;
+use pcadlang::geom::Affine;
+use pcadlang::geom::armature::{Armature, JointPose, Rules, Stretch, Turn};
 use pcadlang::render::{Camera, View};
 use std::collections::HashMap;
 use std::sync::Arc;
 
 fn body(lod: &str) -> Arc<Armature> {
-    let file = |end: &str| embedded(&format!("std/human/{lod}.{end}")).unwrap().as_bytes();
-    let rig = rig_from_json(file("rig.json")).unwrap();
-    let mesh = obj::indexed(file("obj")).unwrap();
-    let morphs = morphs_from_json(file("morphs.json"), &rig.rig).unwrap();
-    let armature = Armature::new(rig.rig, mesh.positions, mesh.triangles, rig.influences).unwrap();
-    Arc::new(armature.with_morphs(morphs).unwrap())
+    shipped::human(lod).unwrap()
 }
 
 fn poses() -> HashMap<String, Vec<JointPose>> {

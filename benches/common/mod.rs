@@ -4,13 +4,13 @@
 #![allow(dead_code)]
 
 pub mod parts;
+#[path = "../../examples/shipped/mod.rs"]
+pub mod shipped;
 
 use criterion::Criterion;
 use glam::{DVec3, Vec3};
 use image::imageops::{FilterType, resize};
-use pcadlang::geom::armature::{Armature, morphs_from_json, rig_from_json};
-use pcadlang::geom::{Affine, GeomError, Mesh, Solid, obj};
-use pcadlang::lang::load::embedded;
+use pcadlang::geom::{Affine, Mesh, Solid};
 use pcadlang::render::Contours;
 use pcadlang::vision::elements::Elements;
 use pcadlang::vision::{Limits, Photo, photo};
@@ -66,15 +66,6 @@ pub fn pose(step: &mut f64) -> Affine {
 /// Where a shipped human body stands before the default camera, turned by so much (radians).
 pub fn standing(turn: f64) -> Affine {
     Affine::new(DVec3::new(0.0, -1.8, 0.0), DVec3::new(0.05, 0.5 + turn, 0.0), DVec3::splat(2.1))
-}
-
-/// A shipped human body: `human.lod2` (coarse), `human.lod1` or `human`.
-pub fn human(lod: &str) -> Result<Arc<Armature>, GeomError> {
-    let file = |end: &str| embedded(&format!("std/human/{lod}.{end}")).unwrap_or_default().as_bytes();
-    let rig = rig_from_json(file("rig.json"))?;
-    let mesh = obj::indexed(file("obj"))?;
-    let morphs = morphs_from_json(file("morphs.json"), &rig.rig)?;
-    Ok(Arc::new(Armature::new(rig.rig, mesh.positions, mesh.triangles, rig.influences)?.with_morphs(morphs)?))
 }
 
 /// A shipped photograph's path.

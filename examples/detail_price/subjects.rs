@@ -1,9 +1,12 @@
 //! What is drawn, in many random poses: shared with the test of the bound on the score.
 
+#[path = "../shipped/mod.rs"]
+mod shipped;
+
 use glam::{DVec3, Vec3};
-use pcadlang::geom::armature::{Armature, JointPose, Rules, morphs_from_json, rig_from_json};
-use pcadlang::geom::{Affine, Caps, GeomError, Mesh, Profile, Solid, obj};
-use pcadlang::lang::load::embedded;
+use pcadlang::geom::armature::{Armature, JointPose, Rules};
+use pcadlang::geom::{Affine, Caps, GeomError, Mesh, Profile, Solid};
+use shipped::human;
 use std::sync::Arc;
 
 /// A kind of shape, in pose after pose.
@@ -24,7 +27,7 @@ impl Subject {
     pub fn all() -> Result<Vec<Subject>, GeomError> {
         let mut all = vec![Subject { name: "lathe".into(), make: Make::Lathe }];
         for lod in ["human", "human.lod1", "human.lod2"] {
-            all.push(Subject { name: lod.into(), make: Make::Body(body(lod)?) });
+            all.push(Subject { name: lod.into(), make: Make::Body(human(lod)?) });
         }
         let dense = Subject { name: "dense".into(), make: Make::Mesh(Solid::lasting(dense()?)) };
         all.push(dense);
@@ -61,14 +64,6 @@ fn vase(rng: &mut Uniform) -> Result<Solid, GeomError> {
         Profile { r: y.iter().map(r).collect(), y }
     };
     Solid::lathe(&[profile(-1.0, 0.4, 24), profile(0.4, 1.0, 8)], 48, 0.03, Caps::Bottom)
-}
-
-fn body(lod: &str) -> Result<Arc<Armature>, GeomError> {
-    let file = |end: &str| embedded(&format!("std/human/{lod}.{end}")).unwrap_or_default().as_bytes();
-    let rig = rig_from_json(file("rig.json"))?;
-    let mesh = obj::indexed(file("obj"))?;
-    let morphs = morphs_from_json(file("morphs.json"), &rig.rig)?;
-    Ok(Arc::new(Armature::new(rig.rig, mesh.positions, mesh.triangles, rig.influences)?.with_morphs(morphs)?))
 }
 
 /// A lumpy ball of 100,352 triangles.

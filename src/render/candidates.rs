@@ -88,13 +88,10 @@ impl Candidates {
         buffer: &mut [f32],
     ) {
         self.find(topology, vertices, size, back, marks);
-        let (width, columns) = (area.right - area.left, [area.left, area.right]);
+        let width = area.right - area.left;
         let large = |face: u32, extent: Extent, buffer: &mut [f32]| {
             if let Some(triangle) = vertices.triangle(topology, face, extent, back) {
-                match marks {
-                    Some(marks) => triangle.fill_some(buffer, width, marks),
-                    None => triangle.fill(buffer, columns, area.top),
-                }
+                triangle.keep(buffer, area, marks);
             }
         };
         let Candidates { faces, extents, count, batch } = self;

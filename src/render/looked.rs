@@ -7,7 +7,7 @@ use super::candidates::Candidates;
 use super::frame::depth_of;
 use super::marks::Marks;
 use super::project::{Lens, Placement, Projected};
-use super::raster::{empty, fill_some};
+use super::raster::{Area, empty, fill_mesh};
 use super::triangle::bits;
 use crate::geom::Solid;
 
@@ -45,9 +45,10 @@ impl Looked {
         let Looked { marks, depth, candidates, .. } = self;
         marks.settle();
         let depth = &mut depth[..camera.pixels()];
+        let area = Area::whole(camera);
         for (i, item) in solid.instances().iter().enumerate() {
             let (placement, vertices) = (Placement::new(camera, &item.affine), projected.mesh(i));
-            fill_some(&item.mesh, &placement, camera, &vertices, candidates, marks, depth);
+            fill_mesh(&item.mesh, &placement, camera, &vertices, candidates, (&area, Some(&*marks)), depth);
         }
         let pinhole = Lens::new(camera).pinhole;
         for (i, word) in marks.words().iter().enumerate() {

@@ -73,6 +73,21 @@ impl Lens {
     }
 }
 
+/// The part of a segment in camera coordinates that lies beyond the near plane, if there is some.
+pub(super) fn beyond_near([mut from, mut to]: [DVec3; 2]) -> Option<[DVec3; 2]> {
+    let near = -Camera::NEAR;
+    if from.z > near && to.z > near {
+        return None;
+    }
+    if from.z > near || to.z > near {
+        let u = (near - from.z) / (to.z - from.z);
+        let mut at = from + (to - from) * u;
+        at.z = near;
+        *(if from.z > near { &mut from } else { &mut to }) = at;
+    }
+    Some([from, to])
+}
+
 /// An instance's way into camera coordinates.
 #[derive(Clone, Copy, Debug)]
 pub(super) struct Placement {

@@ -143,7 +143,7 @@ pub(super) fn draw_nearness(
     let area = Area::whole(camera);
     for (i, item) in solid.instances().iter().enumerate() {
         let placement = Placement::new(camera, &item.affine);
-        fill_mesh(&item.mesh, &placement, camera, &projected.mesh(i), candidates, &area, buffer);
+        fill_mesh(&item.mesh, &placement, camera, &projected.mesh(i), candidates, (&area, None), buffer);
     }
     range
 }
@@ -160,47 +160,27 @@ pub(super) fn draw_mesh(
 ) {
     buffer.clear();
     buffer.resize(area.pixels(), empty(camera));
-    fill_mesh(mesh, placement, camera, vertices, candidates, area, buffer);
+    fill_mesh(mesh, placement, camera, vertices, candidates, (area, None), buffer);
 }
 
-fn fill_mesh(
+/// Keeps the nearer of one mesh and what is there, in the rows of an area; with marks, at marked pixels at least, and the area is the
+/// whole image.
+pub(super) fn fill_mesh(
     mesh: &Mesh,
     placement: &Placement,
     camera: &Camera,
     vertices: &Vertices<'_>,
     candidates: &mut Candidates,
-    area: &Area,
+    (area, marks): (&Area, Option<&Marks>),
     buffer: &mut [f32],
 ) {
     if !vertices.whole {
-        let columns = [area.left, area.right];
-        return cut_triangles(mesh, placement, camera, vertices, |t, _, _| t.fill(buffer, columns, area.top));
+        return cut_triangles(mesh, placement, camera, vertices, |t, _, _| t.keep(buffer, area, marks));
     }
     let how = (size(camera.width, camera.height), back(mesh, placement, vertices));
     vectorised(
         #[inline(always)]
-        || candidates.fill(&mesh.topology, vertices, how, area, None, buffer),
-    );
-}
-
-/// Draws the nearness of one mesh into an image, at the marked pixels; others may be drawn at or not.
-pub(super) fn fill_some(
-    mesh: &Mesh,
-    placement: &Placement,
-    camera: &Camera,
-    vertices: &Vertices<'_>,
-    candidates: &mut Candidates,
-    marks: &Marks,
-    buffer: &mut [f32],
-) {
-    if !vertices.whole {
-        let width = camera.width as usize;
-        return cut_triangles(mesh, placement, camera, vertices, |t, _, _| t.fill_some(buffer, width, marks));
-    }
-    let how = (size(camera.width, camera.height), back(mesh, placement, vertices));
-    vectorised(
-        #[inline(always)]
-        || candidates.fill(&mesh.topology, vertices, how, &Area::whole(camera), Some(marks), buffer),
+        || candidates.fill(&mesh.topology, vertices, how, area, marks, buffer),
     );
 }
 

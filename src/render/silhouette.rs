@@ -1,7 +1,6 @@
 //! Smooth silhouettes: in each face that they cross, the zero set of the (interpolated) facing, many faces at a time.
 
-use super::Camera;
-use super::project::{Lens, Placement, Point, Vertices};
+use super::project::{Lens, Placement, Point, Vertices, beyond_near};
 use crate::geom::{Mesh, Patches, Run, Topology};
 use glam::DVec3;
 
@@ -227,15 +226,12 @@ impl Batch {
     #[inline(never)]
     fn cut(&mut self, count: usize) {
         for i in 0..count {
-            let near = -Camera::NEAR;
             let nearness = self.image.each_ref().map(|at| at[2][i]);
             let seen = nearness.iter().any(|n| *n < f64::INFINITY) && !nearness.iter().any(|n| n.is_nan());
-            let [from, to] = self.camera.each_ref().map(|end| DVec3::new(end[0][i], end[1][i], end[2][i]));
-            self.there[i] = seen && !(from.z > near && to.z > near);
-            if self.there[i] && (from.z > near || to.z > near) {
-                let mut at = from + (to - from) * ((near - from.z) / (to.z - from.z));
-                at.z = near;
-                let end = &mut self.camera[usize::from(from.z <= near)];
+            let ends = self.camera.each_ref().map(|end| DVec3::new(end[0][i], end[1][i], end[2][i]));
+            let part = beyond_near(ends).filter(|_| seen);
+            self.there[i] = part.is_some();
+            for (end, at) in self.camera.iter_mut().zip(part.unwrap_or(ends)) {
                 [end[0][i], end[1][i], end[2][i]] = at.to_array();
             }
         }

@@ -4,20 +4,19 @@
 //! every piece is finite, inside the image, at most 1.5 pixels long, and a function of mesh, placement and camera alone.
 
 use super::Camera;
-use super::project::{Fronts, Lens, Placement, Point, Vertices};
+use super::project::{Fronts, Lens, Placement, Point, Vertices, beyond_near};
 use super::silhouette::{self, Crossed};
 use super::simd::vectorised;
 use super::visibility::{Image, Look, Piece};
 use crate::geom::{Edge, Mesh};
-use glam::DVec3;
 
 /// Whether a point is in view.
 fn usable(p: &Point) -> bool {
     p.nearness < f64::INFINITY
 }
 
-/// Where on the surface a piece comes from: a share of a segment between two points of a face or edge. Silhouettes wander over
-/// the surface when it turns, but to first order they move, at right angles to themselves, as its points do.
+/// Where on the surface a piece comes from: a share of a segment between two points of a face or edge. What silhouettes do besides
+/// moving with these points is said in [`super::wander`].
 #[derive(Clone, Copy, Debug)]
 pub(super) struct Origin {
     /// Vertices of the mesh; of an edge, its second one twice.
@@ -136,8 +135,8 @@ impl<F: FnMut(Piece, &Origin)> Tracer<'_, F> {
         if ends.iter().any(|p| p.nearness.is_nan()) || !ends.iter().any(usable) {
             return;
         }
-        let camera_ends = [placement.point(from.as_dvec3()), placement.point(to.as_dvec3())];
-        let Some((a, b)) = self.segment(camera_ends[0], camera_ends[1]) else { return };
+        let segment = beyond_near([from, to].map(|p| placement.point(p.as_dvec3())));
+        let Some([a, b]) = segment.map(|ends| ends.map(|p| self.lens.point(p))) else { return };
         let Some([tx, ty, length]) = tangent(&a, &b) else { return };
         let direction = [ty, -tx];
         let steep = (b.nearness - a.nearness) / length;
@@ -180,21 +179,6 @@ impl<F: FnMut(Piece, &Origin)> Tracer<'_, F> {
     fn in_depth(&self, nearness: f64, at: &Point) -> f64 {
         let depth = if self.lens.pinhole { nearness / (at.nearness * at.nearness) } else { nearness };
         depth.max(0.0)
-    }
-
-    /// A segment in camera coordinates, cut at the near plane, in the image.
-    fn segment(&self, mut from: DVec3, mut to: DVec3) -> Option<(Point, Point)> {
-        let near = -Camera::NEAR;
-        if from.z > near && to.z > near {
-            return None;
-        }
-        if from.z > near || to.z > near {
-            let u = (near - from.z) / (to.z - from.z);
-            let mut at = from + (to - from) * u;
-            at.z = near;
-            *(if from.z > near { &mut from } else { &mut to }) = at;
-        }
-        Some((self.lens.point(from), self.lens.point(to)))
     }
 
     /// Whether a point is in the image.

@@ -8,6 +8,7 @@ use super::lanes::{LANES, all_bits};
 use super::marks::Marks;
 use super::place::{Extent, Place};
 use super::project::Point;
+use super::raster::Area;
 use glam::Vec4;
 use wide::{f32x8, i32x8};
 
@@ -136,7 +137,16 @@ impl Triangle {
         });
     }
 
-    /// Keeps the nearer of the triangle and what is there, in a buffer of some columns from `left` on and rows from `top` on.
+    /// Keeps the nearer of the triangle and what is there, in the rows of an area; with marks, at marked pixels at least, and the area is
+    /// the whole image.
+    pub fn keep(&self, buffer: &mut [f32], area: &Area, marks: Option<&Marks>) {
+        match marks {
+            Some(marks) => self.fill_some(buffer, area.right - area.left, marks),
+            None => self.fill(buffer, [area.left, area.right], area.top),
+        }
+    }
+
+    /// As [`Triangle::keep`], in a buffer of some columns from `left` on and rows from `top` on.
     #[inline(never)]
     pub fn fill(&self, buffer: &mut [f32], [left, right]: [usize; 2], top: usize) {
         let width = right - left;
@@ -156,7 +166,7 @@ impl Triangle {
 
     /// As [`Triangle::fill`] for a whole image of some columns, but pixels that are not marked need not be drawn.
     #[inline(never)]
-    pub fn fill_some(&self, buffer: &mut [f32], width: usize, marks: &Marks) {
+    fn fill_some(&self, buffer: &mut [f32], width: usize, marks: &Marks) {
         self.runs(|run| {
             for from in (run.from..run.to).step_by(64) {
                 for i in bits(marks.window(run.row * width + from, (run.to - from).min(64))) {

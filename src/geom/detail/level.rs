@@ -4,6 +4,7 @@
 //! That point is told by shares of three kept vertices, so it moves with them, and its distance from the vertex left out bounds how far
 //! the vertex is from the coarse surface in any other pose. Invariant: indices fit the mesh that the level was made of.
 
+use super::Coarse;
 use super::decimate::Step;
 use crate::geom::edges::{pair_edges, weld};
 use crate::geom::{Edge, Edges, Mesh, NO_FACE, Topology};
@@ -82,9 +83,8 @@ impl Level {
     }
 
     /// The level of a mesh.
-    pub fn of(&self, mesh: &Mesh) -> Mesh {
-        let pick = |list: &[Vec3]| self.vertices.iter().filter_map(|v| list.get(*v as usize)).copied().collect();
-        Mesh { positions: pick(&mesh.positions), normals: pick(&mesh.normals), topology: Arc::clone(&self.topology) }
+    pub fn of(&self, mesh: &Mesh) -> Coarse {
+        Coarse::of(mesh, Arc::clone(&self.vertices), Arc::clone(&self.topology))
     }
 }
 

@@ -28,6 +28,15 @@ pub struct Coarse {
     pub vertices: Arc<[u32]>,
 }
 
+impl Coarse {
+    /// Of some of a mesh's vertices, joined like this.
+    fn of(mesh: &Mesh, vertices: Arc<[u32]>, topology: Arc<Topology>) -> Coarse {
+        let pick = |list: &[Vec3]| vertices.iter().filter_map(|v| list.get(*v as usize)).copied().collect();
+        let (positions, normals) = (pick(&mesh.positions), pick(&mesh.normals));
+        Coarse { mesh: Arc::new(Mesh { positions, normals, topology }), vertices }
+    }
+}
+
 /// Whoever has levels for meshes of one topology, or for the parts of a whole.
 pub(super) trait Levels: fmt::Debug + Send + Sync {
     /// Those of a part, ever coarser.
@@ -89,10 +98,9 @@ impl Detail {
         if let Some((_, coarse)) = made.iter().find(|(k, _)| *k == key) {
             return Some(Arc::clone(coarse));
         }
-        let of = |level: &Level| Coarse { mesh: Arc::new(level.of(mesh)), vertices: Arc::clone(&level.vertices) };
         let coarse = Arc::new(match &self.source {
-            Source::Rigid(levels) => of(rigid_levels(levels, mesh).get(key.1)?),
-            Source::Posed(levels, part) => of(levels.levels(*part).get(key.1)?),
+            Source::Rigid(levels) => rigid_levels(levels, mesh).get(key.1)?.of(mesh),
+            Source::Posed(levels, part) => levels.levels(*part).get(key.1)?.of(mesh),
             Source::Turned(turned) => turned.coarse(mesh, turned::Steps { sides: key.0, rings: key.1 }),
         });
         made.push((key, Arc::clone(&coarse)));

@@ -56,10 +56,10 @@ fn a_closed_mesh_stays_closed_and_outward() {
     let mesh = lumpy(48);
     assert!(mesh.topology.edges.iter().all(|e| !e.crease));
     let levels = levels_of(&mesh.positions, &mesh.topology);
-    let counts: Vec<usize> = levels.iter().map(|l| l.of(&mesh).topology.triangles.len()).collect();
+    let counts: Vec<usize> = levels.iter().map(|l| l.of(&mesh).mesh.topology.triangles.len()).collect();
     assert!(levels.len() > 5 && counts.windows(2).all(|w| w[1] < w[0]) && counts.last() < Some(&160), "{counts:?}");
     for level in &levels {
-        let coarse = level.of(&mesh);
+        let coarse = level.of(&mesh).mesh;
         let t = &coarse.topology;
         assert!(t.edges.iter().all(|e| e.faces[1] != NO_FACE && !e.crease));
         // One sphere, its faces turned alike.
@@ -88,7 +88,7 @@ fn creases_boundaries_and_parts_stay_where_they_are() {
     let fine = levels_of(&mesh.positions, &mesh.topology);
     assert!(fine.len() > 4);
     for level in fine {
-        let coarse = level.of(&mesh);
+        let coarse = level.of(&mesh).mesh;
         let (t, at) = (&coarse.topology, |v: u32| coarse.positions[v as usize]);
         let open: Vec<_> = t.edges.iter().filter(|e| e.is_boundary()).collect();
         let creases: Vec<_> = t.edges.iter().filter(|e| e.crease).collect();
@@ -126,14 +126,14 @@ fn no_vertex_is_farther_than_the_deviation() {
             })
             .collect();
         for level in levels_of(&mesh.positions, &mesh.topology) {
-            let far = farthest(&mesh.positions, &level.of(&mesh));
+            let far = farthest(&mesh.positions, &level.of(&mesh).mesh);
             assert!(far <= level.deviation + 1e-6, "{far} {}", level.deviation);
             assert!(far > 0.3 * level.deviation, "a loose bound: {far} {}", level.deviation);
             assert!(!level.strays(&mesh.positions, level.deviation + 1e-6));
             assert!(level.strays(&mesh.positions, 0.9 * level.deviation));
             // The same vertices of another shape, which it was not made for.
             let other = Mesh { positions: bent.clone(), ..mesh.clone() };
-            let far = farthest(&bent, &level.of(&other));
+            let far = farthest(&bent, &level.of(&other).mesh);
             for most in [0.5, 0.8, 1.0, 1.2, 2.0, 4.0].map(|share| share * level.deviation) {
                 assert!(level.strays(&bent, most) || far <= most + 1e-6);
             }
@@ -200,7 +200,7 @@ fn parts_of_a_body_still_meet() {
             let pick = |list: &[Vec3]| own.iter().map(|v| list[*v as usize]).collect::<Vec<_>>();
             let (positions, normals) = (pick(&mesh.positions), pick(&normals));
             let part = Mesh { positions, normals, topology: Arc::new(topology.clone()) };
-            let coarse = levels[k].of(&part);
+            let coarse = levels[k].of(&part).mesh;
             let name = |v: u32| own[levels[k].vertices[v as usize] as usize];
             faces.extend(coarse.topology.triangles.iter().map(|t| t.map(name)));
             assert!(coarse.topology.edges.is_empty());

@@ -6,8 +6,7 @@
 use super::Coarse;
 use crate::geom::Mesh;
 use crate::geom::revolve::{Strip, topology_of};
-use glam::Vec3;
-use std::sync::{Arc, OnceLock};
+use std::sync::OnceLock;
 
 /// The fewest meridians of a coarser surface, as long as the fine one has more.
 const FEWEST_SIDES: u32 = 6;
@@ -85,10 +84,7 @@ impl Turned {
             let parts = rings.iter().take(rings.len() - 1).map(|ring| s.parts[*ring]).collect();
             strips.push(Strip { points: rings.iter().map(|ring| s.points[*ring]).collect(), parts, blend: s.blend });
         }
-        let topology = topology_of(&strips, sides, self.closed, self.part_count);
-        let pick = |list: &[Vec3]| vertices.iter().filter_map(|v| list.get(*v as usize)).copied().collect();
-        let mesh = Mesh { positions: pick(&mesh.positions), normals: pick(&mesh.normals), topology };
-        Coarse { mesh: Arc::new(mesh), vertices: vertices.into() }
+        Coarse::of(mesh, vertices.into(), topology_of(&strips, sides, self.closed, self.part_count))
     }
 }
 
