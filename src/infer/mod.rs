@@ -32,4 +32,4 @@ pub use kernels::{
 };
 pub use neighbours::{Banks, Latent, Latents, Neighbours};
 pub(crate) use parallel::in_parallel;
-pub use plan::{ChainError, ChainResult, Progress, RunOptions, Watch};
+pub use plan::{ChainError, ChainResult, Progress, RunOptions, Watch, run_from};

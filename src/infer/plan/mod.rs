@@ -190,6 +190,39 @@ pub(crate) fn run_chain(
     for trace in &mut begun {
         super::force::apply(code, trace, options, chain)?;
     }
+    run_among(code, plan, options, progress, sink, (chain, started), begun)
+}
+
+/// Runs a plan from a state there is, in place of a start of its own; what the program forces is not forced again. Streams of
+/// random numbers belong to seed, chain and step: two runs from one state need different chains.
+///
+/// # Errors
+/// If the program fails, or the sink does.
+pub fn run_from(
+    code: &Arc<Code>,
+    plan: &[KStmt],
+    options: &RunOptions,
+    progress: &Progress,
+    sink: &mut dyn Sink,
+    chain: u32,
+    mut trace: Trace,
+) -> Result<ChainResult, ChainError> {
+    let started = Instant::now();
+    banks::check(plan, options)?;
+    trace.rollback();
+    run_among(code, plan, options, progress, sink, (chain, started), vec![trace])
+}
+
+/// Runs a plan from the best of some states.
+fn run_among(
+    code: &Arc<Code>,
+    plan: &[KStmt],
+    options: &RunOptions,
+    progress: &Progress,
+    sink: &mut dyn Sink,
+    (chain, started): (u32, Instant),
+    mut begun: Vec<Trace>,
+) -> Result<ChainResult, ChainError> {
     let population = Population::new(&begun);
     let mut trace = begun.swap_remove(0);
     trace.set_incremental(options.incremental);
