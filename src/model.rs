@@ -374,6 +374,7 @@ impl Model {
                 d.hint("widen the prior, or the spread of the observation")
             }
             ChainError::Sink(e) => plain(format!("draws cannot be written: {e}")),
+            ChainError::Checkpoint(e) => plain(format!("a chain cannot go on: {e}")),
         };
         Error { diagnostics: vec![d], sources: self.sources.clone() }
     }

@@ -1,9 +1,10 @@
 //! A drawn value, in the few forms distributions know. It is not a value of the language, which has more.
 
+use serde::{Deserialize, Serialize};
 use std::sync::Arc;
 
 /// What a distribution draws and scores.
-#[derive(Clone, Debug, PartialEq)]
+#[derive(Clone, Debug, PartialEq, Serialize, Deserialize)]
 pub enum Datum {
     /// A number; integers are numbers with an integral value.
     Num(f64),

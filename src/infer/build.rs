@@ -92,7 +92,12 @@ pub(super) fn build(
     }
     let mut scope = scope(&first.value, env)?;
     scope.selector = without(scope.selector, frozen);
-    let signature = format!("{} {scope:?}", print_expr(e));
+    // The text says it all, unless it has names in it.
+    let given: Vec<Value> = match is_constant(e) {
+        true => Vec::new(),
+        false => args[1..].iter().filter_map(|a| evaluate(&a.value, env).ok()).collect(),
+    };
+    let signature = format!("{} {scope:?} {given:?}", print_expr(e));
     let kernel: Box<dyn Kernel> = match name {
         "mh" => Box::new(Mh::new(scope)),
         "block" => Box::new(Block::new(scope)),

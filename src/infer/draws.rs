@@ -3,6 +3,7 @@
 //! Plain data and the [`Sink`] they flow into; where draws go (a file, memory, a progress line) is the sink's business.
 //! Invariant: the values of every row have the length [`width`] of the columns announced before the first row.
 
+use super::Checkpoint;
 use serde::{Deserialize, Serialize};
 use std::io;
 
@@ -94,6 +95,28 @@ pub trait Sink: Send {
     /// # Errors
     /// If that cannot be written.
     fn chain_done(&mut self, chain: u32, steps: u64, warmup: u64, seconds: f64) -> io::Result<()>;
+
+    /// The checkpoint to go on from, asked for once, before all else; the draws before it are the sink's already.
+    ///
+    /// # Errors
+    /// If there is one that cannot be read.
+    fn resume(&mut self) -> io::Result<Option<Checkpoint>> {
+        Ok(None)
+    }
+
+    /// Whether it keeps checkpoints.
+    fn takes_checkpoints(&self) -> bool {
+        false
+    }
+
+    /// Keeps a checkpoint: all draws before it must outlive it.
+    ///
+    /// # Errors
+    /// If it cannot be written; the one before it must be kept then.
+    fn checkpoint(&mut self, checkpoint: &Checkpoint) -> io::Result<()> {
+        let _ = checkpoint;
+        Ok(())
+    }
 }
 
 /// Takes draws and forgets them: for chains that a watch looks at.

@@ -1,9 +1,11 @@
 //! What a kernel is: one step of a chain that leaves the posterior invariant.
 
+use super::state::StateError;
 use crate::lang::error::RunError;
 use crate::lang::key::mix;
 use crate::rng::{Purpose, Stream, StreamKey};
 use crate::trace::{Draws, Selection, Selector, Target, Trace, TraceResult, Weight};
+use serde::{Deserialize, Serialize};
 use std::sync::Arc;
 
 /// Where in a chain a step is, and what randomness it may use.
@@ -55,7 +57,7 @@ impl At {
 }
 
 /// What a step did.
-#[derive(Clone, Copy, Debug, Default, PartialEq)]
+#[derive(Clone, Copy, Debug, Default, PartialEq, Serialize, Deserialize)]
 pub struct Outcome {
     /// Proposals made.
     pub proposals: u32,
@@ -66,6 +68,7 @@ pub struct Outcome {
     /// Trajectories on which the energy was not kept.
     pub divergent: u32,
     /// The choice all of it was about, of a kernel that takes one at a time.
+    #[serde(skip)]
     pub site: Option<Target>,
 }
 
@@ -110,6 +113,24 @@ pub trait Kernel: Send {
     /// The log of the evidence (the marginal likelihood), for kernels that estimate it.
     fn log_evidence(&self) -> Option<f64> {
         None
+    }
+
+    /// What it has learnt and remembers beside the state it moved last, for a checkpoint; nothing, if each step is a function of
+    /// the state alone.
+    fn save(&self, trace: &Trace) -> Vec<u8> {
+        let _ = trace;
+        Vec::new()
+    }
+
+    /// Takes up what [`Kernel::save`] of a kernel made the same way gave.
+    ///
+    /// # Errors
+    /// If these are no such bytes.
+    fn load(&mut self, state: &[u8]) -> Result<(), StateError> {
+        match state {
+            [] => Ok(()),
+            _ => Err(StateError::new(format!("{} remembers nothing", self.name()))),
+        }
     }
 
     /// Moves the trace by one step.

@@ -13,6 +13,7 @@ mod kernel;
 mod kernels;
 mod neighbours;
 mod parallel;
+mod plain;
 mod plan;
 mod population;
 pub mod predictive;
@@ -20,6 +21,7 @@ mod record;
 mod resampling;
 mod selection;
 mod sites;
+mod state;
 
 pub use chains::run_chains;
 pub use default_plan::default_plan;
@@ -32,4 +34,5 @@ pub use kernels::{
 };
 pub use neighbours::{Banks, Latent, Latents, Neighbours};
 pub(crate) use parallel::in_parallel;
-pub use plan::{ChainError, ChainResult, Progress, RunOptions, Watch, run_from};
+pub use plan::{ChainError, ChainResult, Checkpoint, Progress, RunOptions, Watch, run_from};
+pub use state::StateError;

@@ -9,6 +9,7 @@
 use super::resampling::systematic;
 use crate::rng::Stream;
 use crate::trace::{Constraint, Draws, Trace, TraceResult};
+use serde::{Deserialize, Serialize};
 
 /// Steps a member makes before it is the next one's turn: enough that going over, a full update, costs little beside them.
 const LEG: u64 = 16;
@@ -16,7 +17,7 @@ const LEG: u64 = 16;
 type State = Vec<(u64, Constraint)>;
 
 /// States and their log-likelihoods; the chain's trace is in the one whose turn it is.
-#[derive(Debug)]
+#[derive(Clone, Debug, PartialEq, Serialize, Deserialize)]
 pub(crate) struct Population {
     members: Vec<(State, f64)>,
     first: usize,
@@ -33,6 +34,11 @@ impl Population {
             _ => traces.iter().map(|t| (t.constraints(), t.log_likelihood())).collect(),
         };
         Population { first: members.len(), members, turn: 0, steps: 0, power: None }
+    }
+
+    /// Whether it is one that can be gone on with; what was read may not be.
+    pub fn fits(&self) -> bool {
+        self.members.is_empty() || self.turn < self.members.len()
     }
 
     /// Called after each step of the annealing, with the share of it that is done and the power that belongs to it. Gives the

@@ -30,6 +30,11 @@ impl Recorder {
         &self.columns
     }
 
+    /// Takes up the columns of a checkpoint.
+    pub fn set_columns(&mut self, columns: Vec<Column>) {
+        self.columns = columns;
+    }
+
     /// The values to record: what is collected (or everything assumed), and the predictions.
     pub fn values(
         &self,

@@ -26,6 +26,16 @@ impl Sites {
         site.accepted += u64::from(outcome.accepted);
     }
 
+    /// The counts, for a checkpoint.
+    pub fn list(&self) -> Vec<(u64, SiteStats)> {
+        self.0.iter().map(|(hash, stats)| (*hash, stats.clone())).collect()
+    }
+
+    /// Takes up the counts of a checkpoint.
+    pub fn load(&mut self, list: Vec<(u64, SiteStats)>) {
+        self.0 = list.into_iter().collect();
+    }
+
     /// The counts, by address.
     pub fn into_stats(self) -> Vec<SiteStats> {
         let mut all: Vec<SiteStats> = self.0.into_values().collect();

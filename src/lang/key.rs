@@ -1,11 +1,12 @@
 //! Keys: what tells the elements of containers, the passes of loops and the entries of `mem` apart.
 
 use super::value::Value;
+use serde::{Deserialize, Serialize};
 use std::fmt;
 use std::sync::Arc;
 
 /// A key. Numbers compare by their bits, with -0 made 0; NaN is not a key.
-#[derive(Clone, Debug, PartialEq, Eq, Hash, PartialOrd, Ord)]
+#[derive(Clone, Debug, PartialEq, Eq, Hash, PartialOrd, Ord, Serialize, Deserialize)]
 pub enum Key {
     /// A number, by its bits.
     Num(u64),

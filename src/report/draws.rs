@@ -4,7 +4,7 @@ use crate::infer::diagnostics::{Summary, summary};
 use crate::infer::draws::{Column, DrawRow, Shape};
 
 /// The draws of one chain.
-#[derive(Clone, Debug, Default, PartialEq)]
+#[derive(Clone, Debug, PartialEq)]
 pub struct ChainDraws {
     /// Pairs said about the chain (settings, counts), as the file of draws has them.
     pub comments: Vec<(String, String)>,
@@ -12,6 +12,14 @@ pub struct ChainDraws {
     pub columns: Vec<Column>,
     /// The draws, in order.
     pub rows: Vec<DrawRow>,
+    /// Of how many draws each one is kept: 1, unless there was no room for all.
+    pub every: u64,
+}
+
+impl Default for ChainDraws {
+    fn default() -> Self {
+        ChainDraws { comments: Vec::new(), columns: Vec::new(), rows: Vec::new(), every: 1 }
+    }
 }
 
 /// One number per draw, over all chains.

@@ -3,6 +3,8 @@
 //! Nothing here prints or decides; it turns results into text and files. It knows draws, diagnostics and plain pixel
 //! buffers, not programs, traces or the renderer.
 
+mod chain_file;
+pub mod checkpoint;
 pub mod csv;
 mod draws;
 pub mod evaluation;
@@ -19,6 +21,7 @@ pub mod table;
 mod warnings;
 mod whole;
 
+pub use chain_file::ChainFile;
 pub use draws::{ChainDraws, Quantity, quantities};
 pub use hash::{bytes_hash, text_hash};
 pub use modes::{DISAGREE, Mode, modes, modes_table, r_hat_text};

@@ -107,9 +107,10 @@ impl RunDir {
     }
 }
 
-/// Whether a file holds the draws of a chain: `chain-N.csv`.
+/// Whether a file holds the draws of a chain, or its checkpoint: `chain-N.csv`, `chain-N.checkpoint`.
 fn is_chain(name: &str) -> bool {
-    let number = name.strip_prefix("chain-").and_then(|n| n.strip_suffix(".csv"));
+    let rest = name.strip_prefix("chain-");
+    let number = rest.and_then(|n| n.strip_suffix(".csv").or_else(|| n.strip_suffix(".checkpoint")));
     number.is_some_and(|n| !n.is_empty() && n.bytes().all(|b| b.is_ascii_digit()))
 }
 

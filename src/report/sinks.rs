@@ -3,34 +3,59 @@
 use super::draws::ChainDraws;
 use crate::infer::draws::{Column, DrawRow, Sink};
 use std::io;
-use std::sync::{Arc, Mutex, PoisonError};
+use std::sync::{Arc, Mutex, MutexGuard, PoisonError};
 
 /// Keeps the draws of a chain in memory. Clones share them, so that one clone can be handed to the chain and the other
 /// looked into.
 #[derive(Clone, Debug, Default)]
-pub struct Memory(Arc<Mutex<ChainDraws>>);
+pub struct Memory {
+    draws: Arc<Mutex<ChainDraws>>,
+    /// The most numbers it holds; 0: no bound.
+    room: usize,
+}
+
+/// The numbers that a draw takes besides those recorded.
+const OVERHEAD: usize = 14;
 
 impl Memory {
+    /// Room for so many numbers: when they are used up, every other draw is let go, and from then on only every second one is kept,
+    /// every fourth, and so on.
+    pub fn bounded(room: usize) -> Memory {
+        Memory { room, ..Memory::default() }
+    }
+
+    fn lock(&self) -> MutexGuard<'_, ChainDraws> {
+        self.draws.lock().unwrap_or_else(PoisonError::into_inner)
+    }
+
     /// The draws so far.
     pub fn draws(&self) -> ChainDraws {
-        self.0.lock().unwrap_or_else(PoisonError::into_inner).clone()
+        self.lock().clone()
     }
 }
 
 impl Sink for Memory {
     fn columns(&mut self, columns: &[Column]) -> io::Result<()> {
-        self.0.lock().unwrap_or_else(PoisonError::into_inner).columns = columns.to_vec();
+        self.lock().columns = columns.to_vec();
         Ok(())
     }
 
     fn draw(&mut self, row: &DrawRow) -> io::Result<()> {
-        self.0.lock().unwrap_or_else(PoisonError::into_inner).rows.push(row.clone());
+        let mut kept = self.lock();
+        if row.draw.is_multiple_of(kept.every) {
+            kept.rows.push(row.clone());
+            if self.room > 0 && kept.rows.len() * (row.values.len() + OVERHEAD) > self.room {
+                kept.every *= 2;
+                let every = kept.every;
+                kept.rows.retain(|r| r.draw.is_multiple_of(every));
+            }
+        }
         Ok(())
     }
 
     fn chain_done(&mut self, _chain: u32, steps: u64, warmup: u64, _seconds: f64) -> io::Result<()> {
         let said = [("steps", steps), ("warmup_steps", warmup)].map(|(k, v)| (k.to_owned(), v.to_string()));
-        self.0.lock().unwrap_or_else(PoisonError::into_inner).comments.extend(said);
+        self.lock().comments.extend(said);
         Ok(())
     }
 }
@@ -56,6 +81,22 @@ impl Sink for Tee {
 #[cfg(test)]
 mod tests {
     use super::*;
+
+    #[test]
+    fn a_full_memory_keeps_draws_at_even_distances() {
+        let mut memory = Memory::bounded(100 * (2 + OVERHEAD));
+        for draw in 0..100_000 {
+            let x = draw as f64;
+            let (log_prior, log_likelihood, values) = (0.0, -x, vec![x, 2.0 * x]);
+            memory
+                .draw(&DrawRow { chain: 0, draw, step: draw, log_joint: -x, log_prior, log_likelihood, values })
+                .unwrap();
+            let kept = memory.lock();
+            assert!(kept.rows.len() <= 100);
+            assert!(kept.rows.iter().zip(0..).all(|(r, i)| r.draw == i * kept.every), "draw {draw}");
+        }
+        assert_eq!((memory.draws().every, memory.draws().rows.len()), (1024, 98));
+    }
 
     #[test]
     fn a_tee_feeds_both() {

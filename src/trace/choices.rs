@@ -180,25 +180,36 @@ impl Graph {
 
     /// Choices by their place in the program: slot by slot and pass by pass, from the outside in.
     pub fn in_program_order(&self, targets: &[Target]) -> Vec<Target> {
-        let mut keyed: Vec<(SmallVec<[u64; 6]>, Target)> = targets
-            .iter()
-            .map(|t| {
-                let mut place = SmallVec::new();
-                let mut n = t.node;
-                while n != NONE {
-                    let frame = &self.frames[self.nodes[n as usize].frame as usize];
-                    place.push(u64::from(n - frame.base));
-                    // Entries of a `mem` have no order of their own.
-                    let entry = if matches!(frame.args, Arguments::Values(_)) { frame.path } else { 0 };
-                    place.extend([u64::from(frame.pass), entry]);
-                    n = frame.owner;
-                }
-                place.reverse();
-                (place, *t)
-            })
-            .collect();
+        let mut keyed: Vec<_> = targets.iter().map(|t| (self.place(t.node), *t)).collect();
         keyed.sort_by(|a, b| a.0.cmp(&b.0).then(a.1.element.cmp(&b.1.element)));
         keyed.into_iter().map(|(_, t)| t).collect()
+    }
+
+    /// The slots and passes that lead to a node, from the outside in.
+    fn place(&self, mut n: NodeId) -> SmallVec<[u64; 6]> {
+        let mut place = SmallVec::new();
+        while n != NONE {
+            let frame = &self.frames[self.nodes[n as usize].frame as usize];
+            place.push(u64::from(n - frame.base));
+            // Entries of a `mem` have no order of their own.
+            let entry = if matches!(frame.args, Arguments::Values(_)) { frame.path } else { 0 };
+            place.extend([u64::from(frame.pass), entry]);
+            n = frame.owner;
+        }
+        place.reverse();
+        place
+    }
+
+    /// Sorts nodes frame by frame, in an order that is a function of the state: their numbers are one of how it came about.
+    pub fn sort_by_place(&self, nodes: &mut [NodeId]) {
+        let frame = |n: NodeId| self.nodes[n as usize].frame;
+        let mut frames: Vec<u32> = nodes.iter().map(|n| frame(*n)).collect();
+        frames.sort_unstable();
+        frames.dedup();
+        let mut places: Vec<_> = frames.iter().map(|f| (self.place(self.frames[*f as usize].base), *f)).collect();
+        places.sort_unstable();
+        let ranks: FxHashMap<u32, usize> = places.into_iter().enumerate().map(|(rank, (_, f))| (f, rank)).collect();
+        nodes.sort_unstable_by_key(|n| (ranks.get(&frame(*n)), *n));
     }
 
     /// What selections ask about a choice, or `project` about an observation.

@@ -109,6 +109,7 @@ impl Trace {
         let weight = g.weight(&before.prior, &before.likelihood);
         g.commit(&trace.code);
         g.constraints.clear();
+        g.revision = 0;
         Ok((trace, weight))
     }
 
@@ -295,7 +296,9 @@ impl Trace {
     ) -> TraceResult<()> {
         let mut scored: Vec<u32> = self.all_targets().iter().map(|t| t.node).collect();
         scored.dedup();
-        scored.extend(self.scored_nodes());
+        let mut observed: Vec<u32> = self.scored_nodes().collect();
+        self.graph.sort_by_place(&mut observed);
+        scored.extend(observed);
         scored.retain(|n| weight(*n) != 0.0);
         self.graph.gradient(&self.code, targets, &scored, (power, weight), out)
     }
@@ -478,6 +481,11 @@ impl Trace {
         let mut all: Vec<_> = targets.iter().map(|t| (self.address(*t), self.value(*t), self.score_of(*t))).collect();
         all.sort_by(|a, b| a.0.cmp(&b.0));
         all
+    }
+
+    /// Whether nothing was committed since the program was run.
+    pub(crate) fn is_new(&self) -> bool {
+        self.graph.revision == 0
     }
 
     /// Turns incremental updates off (every proposal re-runs the whole program) or on again; chains are the same either way.

@@ -7,6 +7,7 @@ use super::node::*;
 use crate::dist::Datum;
 use crate::num::ExactSum;
 use crate::rng::{Stream, StreamKey};
+use serde::{Deserialize, Serialize};
 
 /// Where the random numbers of an update come from: one stream for each address, whatever the order of evaluation.
 #[derive(Clone, Copy, Debug, Default)]
@@ -51,7 +52,7 @@ pub(crate) struct Pending {
 }
 
 /// A value that a choice takes when it is first drawn.
-#[derive(Clone, Debug, PartialEq)]
+#[derive(Clone, Debug, PartialEq, Serialize, Deserialize)]
 pub enum Constraint {
     /// In stored form, as saved traces keep it.
     Stored(Datum),

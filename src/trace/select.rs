@@ -2,10 +2,11 @@
 
 use crate::lang::address::{Address, AddressSegment};
 use crate::lang::key::Key;
+use serde::{Deserialize, Serialize};
 use std::sync::Arc;
 
 /// A set of choices, by address, tag or kind.
-#[derive(Clone, Debug, PartialEq)]
+#[derive(Clone, Debug, PartialEq, Serialize, Deserialize)]
 pub enum Selector {
     /// Every choice.
     All,
@@ -31,7 +32,7 @@ pub enum Selector {
 }
 
 /// Kinds of choices, by distribution.
-#[derive(Clone, Copy, Debug, PartialEq, Eq)]
+#[derive(Clone, Copy, Debug, PartialEq, Eq, Serialize, Deserialize)]
 pub enum ChoiceKind {
     /// `$continuous`
     Continuous,
@@ -44,14 +45,14 @@ pub enum ChoiceKind {
 }
 
 /// An address with wildcards.
-#[derive(Clone, Debug, PartialEq)]
+#[derive(Clone, Debug, PartialEq, Serialize, Deserialize)]
 pub struct Pattern {
     /// Its segments.
     pub segments: Vec<PatternSegment>,
 }
 
 /// One segment of a pattern.
-#[derive(Clone, Debug, PartialEq)]
+#[derive(Clone, Debug, PartialEq, Serialize, Deserialize)]
 pub enum PatternSegment {
     /// `**`: any number of segments.
     Deep,

@@ -7,6 +7,7 @@
 
 use crate::infer::kernel::{At, Kernel, Outcome};
 use crate::infer::selection::fail;
+use crate::infer::state::{StateError, pack, unpack};
 use crate::lang::code::Observed;
 use crate::lang::value::Value;
 use crate::syntax::span::Span;
@@ -21,13 +22,15 @@ pub struct Abc {
     distance: f64,
     /// What it is a distance from.
     observed: Option<Arc<Observed>>,
+    /// Whether the distance is a checkpoint's, and from what is observed in the next step.
+    loaded: bool,
     span: Span,
 }
 
 impl Abc {
     /// A kernel and the largest distance. `span` is where errors point.
     pub fn new(kernel: Box<dyn Kernel>, eps: f64, span: Span) -> Self {
-        Abc { kernel, eps, distance: f64::INFINITY, observed: None, span }
+        Abc { kernel, eps, distance: f64::INFINITY, observed: None, loaded: false, span }
     }
 }
 
@@ -96,7 +99,21 @@ impl Kernel for Abc {
         "abc".into()
     }
 
+    fn save(&self, trace: &Trace) -> Vec<u8> {
+        pack(&(self.kernel.save(trace), self.distance, self.loaded || self.observed.is_some()))
+    }
+
+    fn load(&mut self, state: &[u8]) -> Result<(), StateError> {
+        let inner: Vec<u8>;
+        (inner, self.distance, self.loaded) = unpack(state)?;
+        self.observed = None;
+        self.kernel.load(&inner)
+    }
+
     fn step(&mut self, trace: &mut Trace, at: &At) -> TraceResult<Outcome> {
+        if std::mem::take(&mut self.loaded) {
+            self.observed = Some(Arc::clone(trace.replacements()));
+        }
         let same = self.observed.as_ref().is_some_and(|o| Arc::ptr_eq(o, trace.replacements()));
         if !same {
             // Other data than the distance is from.

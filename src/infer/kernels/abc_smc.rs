@@ -11,6 +11,7 @@ use super::abc::{simulate, step_within};
 use super::particles::{Independent, Prior, Way};
 use crate::infer::kernel::{At, Kernel};
 use crate::infer::resampling::systematic;
+use crate::infer::state::{StateError, holds, pack, unpack};
 use crate::syntax::span::Span;
 use crate::trace::{Selector, Trace, TraceResult};
 
@@ -54,6 +55,17 @@ impl Way for Closer {
 
     fn forget(&mut self) {
         self.tolerances.clear();
+    }
+
+    fn save(&self, trace: &Trace) -> Vec<u8> {
+        pack(&(self.kernel.save(trace), &self.tolerances))
+    }
+
+    fn load(&mut self, state: &[u8]) -> Result<(), StateError> {
+        let (inner, tolerances): (Vec<u8>, Vec<f64>) = unpack(state)?;
+        holds(tolerances.last().is_none_or(|t| *t == self.eps), self.name())?;
+        self.tolerances = tolerances;
+        self.kernel.load(&inner)
     }
 
     fn lead(&mut self, prior: &Prior, trace: &mut Trace, at: &At) -> TraceResult<(Vec<Trace>, f64)> {

@@ -8,6 +8,8 @@
 
 use crate::infer::kernel::{At, Kernel, Outcome, decide, recoverable};
 use crate::infer::selection::fail;
+use crate::infer::state::StateError;
+use crate::lang::error::RunError;
 use crate::syntax::span::Span;
 use crate::trace::{Selector, Trace, TraceResult};
 
@@ -30,27 +32,24 @@ impl Delayed {
     /// Brings the twin to the present state.
     fn follow(&mut self, trace: &mut Trace) -> TraceResult<&mut Trace> {
         trace.rollback();
-        let twin = match self.twin.take() {
-            Some(mut twin) => {
-                twin.observe_as(trace)?;
-                twin.propose_choices_of(trace)?;
-                twin.commit();
-                twin
-            }
-            None => match trace.under_surrogates(&self.observations)? {
-                Some(twin) => twin,
-                None => {
-                    let mut e = fail(self.span, "delayed: no observation there has a coarse surrogate".into());
-                    e.hint = Some("observe normal(x, 1) = 2 with coarse = normal(x, 2) as y; … delayed(…, @y)".into());
-                    return Err(e);
-                }
-            },
+        let mut twin = match self.twin.take() {
+            Some(twin) => twin,
+            None => trace.under_surrogates(&self.observations)?.ok_or_else(|| self.nothing_coarse())?,
         };
+        twin.observe_as(trace)?;
+        twin.propose_choices_of(trace)?;
+        twin.commit();
         if let Some(extra) = trace.lacks(&twin) {
             let address = twin.address(extra);
             return Err(fail(self.span, format!("delayed: only the surrogate asks for the choice {address}")));
         }
         Ok(self.twin.insert(twin))
+    }
+
+    fn nothing_coarse(&self) -> Box<RunError> {
+        let mut e = fail(self.span, "delayed: no observation there has a coarse surrogate".into());
+        e.hint = Some("observe normal(x, 1) = 2 with coarse = normal(x, 2) as y; … delayed(…, @y)".into());
+        e
     }
 }
 
@@ -63,6 +62,14 @@ fn tempered(trace: &Trace, power: f64) -> f64 {
 impl Kernel for Delayed {
     fn name(&self) -> String {
         format!("delayed {}", self.kernel.name())
+    }
+
+    fn save(&self, trace: &Trace) -> Vec<u8> {
+        self.kernel.save(self.twin.as_ref().unwrap_or(trace))
+    }
+
+    fn load(&mut self, state: &[u8]) -> Result<(), StateError> {
+        self.kernel.load(state)
     }
 
     fn sweep(&mut self, trace: &mut Trace) -> Option<usize> {

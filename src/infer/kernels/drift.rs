@@ -8,10 +8,12 @@
 use super::shape::{MOST, Shape};
 use crate::dist::{Datum, Support};
 use crate::infer::kernel::{At, Kernel, Outcome, Pick, Registered, Scope, decide, recoverable};
+use crate::infer::state::{StateError, holds, pack, unpack};
 use crate::lang::key::mix;
 use crate::rng::Stream;
 use crate::trace::{Change, Target, Trace, TraceResult};
 use rustc_hash::FxHashMap;
+use serde::{Deserialize, Serialize};
 
 /// The acceptance rates aimed at in one dimension and in many (Roberts & Rosenthal 2001).
 const ONE_D: f64 = 0.44;
@@ -31,14 +33,14 @@ pub struct Drift {
     shapes: FxHashMap<u64, Shape>,
 }
 
-#[derive(Clone, Copy, Debug)]
+#[derive(Clone, Copy, Debug, Serialize, Deserialize)]
 struct Scale {
     log: f64,
     steps: f64,
 }
 
 /// A running variance (Welford 1962), pooled over the coordinates of a choice.
-#[derive(Clone, Debug, Default)]
+#[derive(Clone, Debug, Default, Serialize, Deserialize)]
 struct Spread {
     count: f64,
     mean: Vec<f64>,
@@ -177,6 +179,15 @@ impl Kernel for Drift {
 
     fn sweep(&mut self, trace: &mut Trace) -> Option<usize> {
         self.scope.sweep(trace)
+    }
+
+    fn save(&self, _: &Trace) -> Vec<u8> {
+        pack(&(&self.scales, &self.spreads, &self.shapes))
+    }
+
+    fn load(&mut self, state: &[u8]) -> Result<(), StateError> {
+        (self.scales, self.spreads, self.shapes) = unpack(state)?;
+        holds(self.shapes.values().all(Shape::fits), "drift")
     }
 
     fn step(&mut self, trace: &mut Trace, at: &At) -> TraceResult<Outcome> {

@@ -4,6 +4,7 @@
 
 use crate::infer::kernel::{At, Kernel, Outcome, accepts};
 use crate::infer::selection::fail;
+use crate::infer::state::{StateError, pack, unpack};
 use crate::lang::code::Observed;
 use crate::num::log_sum_exp;
 use crate::rng::Stream;
@@ -18,9 +19,18 @@ pub(super) trait Way {
     /// Forgets what was learnt from other data.
     fn forget(&mut self);
 
+    /// See [`Kernel::save`].
+    fn save(&self, trace: &Trace) -> Vec<u8>;
+
+    /// See [`Kernel::load`].
+    fn load(&mut self, state: &[u8]) -> Result<(), StateError>;
+
     /// Draws particles and leads them there; gives them and the log of the evidence's estimate.
     fn lead(&mut self, prior: &Prior, trace: &mut Trace, at: &At) -> TraceResult<(Vec<Trace>, f64)>;
 }
+
+/// Nothing was estimated yet.
+const NO_ESTIMATES: (u64, f64) = (0, f64::NEG_INFINITY);
 
 /// Where particles are drawn from.
 pub(super) struct Prior {
@@ -37,8 +47,10 @@ pub struct Independent<W> {
     accepted: Option<(f64, f64)>,
     /// What was observed then.
     observed: Option<Arc<Observed>>,
-    /// The logs of all estimates.
-    estimates: Vec<f64>,
+    /// Whether all this is a checkpoint's, and of what is observed in the next step.
+    loaded: bool,
+    /// How many estimates there were, and the log of their sum.
+    estimates: (u64, f64),
 }
 
 impl Prior {
@@ -62,7 +74,8 @@ impl Prior {
 impl<W: Way> Independent<W> {
     /// For particles that go this way; frozen choices are not drawn anew. `span` is where errors point.
     pub(super) fn by(way: W, frozen: Selector, span: Span) -> Self {
-        Independent { way, prior: Prior { frozen }, span, accepted: None, observed: None, estimates: Vec::new() }
+        let (prior, estimates) = (Prior { frozen }, NO_ESTIMATES);
+        Independent { way, prior, span, accepted: None, observed: None, loaded: false, estimates }
     }
 
     /// Begins a step; true if it is the first of all or the first under other data, whose estimates start anew.
@@ -71,10 +84,13 @@ impl<W: Way> Independent<W> {
     /// If the state is not the one that was accepted last.
     fn begin(&mut self, trace: &mut Trace, at: &At) -> TraceResult<bool> {
         trace.rollback();
+        if std::mem::take(&mut self.loaded) {
+            self.observed = Some(Arc::clone(trace.replacements()));
+        }
         if !self.observed.as_ref().is_some_and(|o| Arc::ptr_eq(o, trace.replacements())) {
             self.observed = Some(Arc::clone(trace.replacements()));
             self.accepted = None;
-            self.estimates.clear();
+            self.estimates = NO_ESTIMATES;
             return Ok(true);
         }
         if let Some((log_joint, _)) = self.accepted
@@ -94,7 +110,8 @@ impl<W: Way> Independent<W> {
     /// Takes one of the particles as the new state, or stays.
     fn decide(&mut self, trace: &mut Trace, mut particles: Vec<Trace>, log_evidence: f64, rng: &mut Stream) -> Outcome {
         let one = rng.index(particles.len());
-        self.estimates.push(log_evidence);
+        let (count, log_sum) = self.estimates;
+        self.estimates = (count + 1, log_sum_exp(&[log_sum, log_evidence]));
         let ratio = match self.accepted {
             Some((_, old)) => log_evidence - old,
             // The first state is a start like any other.
@@ -116,6 +133,18 @@ impl<W: Way + Send> Kernel for Independent<W> {
         self.way.name().into()
     }
 
+    fn save(&self, trace: &Trace) -> Vec<u8> {
+        let begun = self.loaded || self.observed.is_some();
+        pack(&(self.way.save(trace), self.accepted, begun, self.estimates))
+    }
+
+    fn load(&mut self, state: &[u8]) -> Result<(), StateError> {
+        let way: Vec<u8>;
+        (way, self.accepted, self.loaded, self.estimates) = unpack(state)?;
+        self.observed = None;
+        self.way.load(&way)
+    }
+
     fn step(&mut self, trace: &mut Trace, at: &At) -> TraceResult<Outcome> {
         if self.begin(trace, at)? {
             self.way.forget();
@@ -126,7 +155,7 @@ impl<W: Way + Send> Kernel for Independent<W> {
 
     /// The log of the mean of all estimates.
     fn log_evidence(&self) -> Option<f64> {
-        let n = self.estimates.len();
-        (n > 0).then(|| log_sum_exp(&self.estimates) - libm::log(n as f64))
+        let (n, log_sum) = self.estimates;
+        (n > 0).then(|| log_sum - libm::log(n as f64))
     }
 }

@@ -3,6 +3,7 @@
 
 use crate::rng::Stream;
 use nalgebra::DMatrix;
+use serde::{Deserialize, Serialize};
 
 /// The first window.
 const WINDOW: u32 = 100;
@@ -10,7 +11,7 @@ const WINDOW: u32 = 100;
 pub(super) const MOST: usize = 64;
 
 /// A covariance being learnt, and the factor of the last one.
-#[derive(Clone, Debug)]
+#[derive(Clone, Debug, Serialize, Deserialize)]
 pub(super) struct Shape {
     mean: Vec<f64>,
     /// Sums of products of deviations, the lower triangle by rows.
@@ -25,6 +26,13 @@ impl Shape {
         let window = WINDOW.max(10 * dimensions as u32);
         let products = vec![0.0; dimensions * (dimensions + 1) / 2];
         Shape { mean: vec![0.0; dimensions], products, count: 0, window, factor: None }
+    }
+
+    /// Whether its parts have the sizes they must have; those that were read may not.
+    pub fn fits(&self) -> bool {
+        let d = self.mean.len();
+        let factor = self.factor.as_ref().is_none_or(|f| (f.nrows(), f.ncols()) == (d, d));
+        d <= MOST && self.products.len() == d * (d + 1) / 2 && factor
     }
 
     /// Learns from a state.

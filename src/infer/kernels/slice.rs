@@ -5,6 +5,7 @@
 //! vanish, counts as outside the slice, so the kernel moves within the present structure.
 
 use crate::infer::kernel::{At, Kernel, Outcome, Registered, Scope, recoverable};
+use crate::infer::state::{StateError, pack, unpack};
 use crate::rng::Stream;
 use crate::trace::{Change, Target, Trace, TraceResult};
 use rustc_hash::FxHashMap;
@@ -161,6 +162,16 @@ impl Line<'_> {
 impl Kernel for Slice {
     fn name(&self) -> String {
         "slice".into()
+    }
+
+    fn save(&self, _: &Trace) -> Vec<u8> {
+        pack(&self.learnt.iter().collect::<Vec<_>>())
+    }
+
+    fn load(&mut self, state: &[u8]) -> Result<(), StateError> {
+        let learnt: Vec<_> = unpack(state)?;
+        self.learnt = learnt.into_iter().collect();
+        Ok(())
     }
 
     fn step(&mut self, trace: &mut Trace, at: &At) -> TraceResult<Outcome> {

@@ -9,6 +9,7 @@
 use super::particles::{Independent, Prior, Way};
 use crate::infer::kernel::{At, Kernel, inner_step};
 use crate::infer::resampling::systematic;
+use crate::infer::state::{StateError, holds, pack, unpack};
 use crate::num::log_sum_exp;
 use crate::syntax::span::Span;
 use crate::trace::{Selector, Trace, TraceResult};
@@ -41,6 +42,17 @@ impl Way for Annealed {
 
     fn forget(&mut self) {
         self.powers.clear();
+    }
+
+    fn save(&self, trace: &Trace) -> Vec<u8> {
+        pack(&(self.kernel.save(trace), &self.powers))
+    }
+
+    fn load(&mut self, state: &[u8]) -> Result<(), StateError> {
+        let (inner, powers): (Vec<u8>, Vec<f64>) = unpack(state)?;
+        holds(powers.iter().all(|p| *p > 0.0) && powers.last().is_none_or(|p| *p == 1.0), self.name())?;
+        self.powers = powers;
+        self.kernel.load(&inner)
     }
 
     fn lead(&mut self, prior: &Prior, trace: &mut Trace, at: &At) -> TraceResult<(Vec<Trace>, f64)> {

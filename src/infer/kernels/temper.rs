@@ -6,7 +6,8 @@
 //! everywhere (Miasojedow, Moulines & Vihola 2013).
 
 use crate::infer::kernel::{At, Kernel, Outcome, accepts, inner_step};
-use crate::trace::{Trace, TraceResult};
+use crate::infer::state::{StateError, holds, pack, unpack};
+use crate::trace::{Constraint, Trace, TraceResult};
 
 /// The rate of swaps aimed at: the best one for many temperatures (Kone & Kofke 2005).
 const AIM: f64 = 0.234;
@@ -17,6 +18,8 @@ pub struct Temper {
     kernels: Vec<Box<dyn Kernel>>,
     /// The states of the levels after the first.
     replicas: Vec<Trace>,
+    /// Those of them that a checkpoint had, until the first step.
+    saved: Vec<Vec<(u64, Constraint)>>,
     /// The logarithms of the gaps between the log powers of neighbours.
     gaps: Vec<f64>,
     rounds: u64,
@@ -27,7 +30,7 @@ impl Temper {
     pub fn new(kernels: Vec<Box<dyn Kernel>>, hottest: f64) -> Self {
         let pairs = kernels.len().saturating_sub(1);
         let gap = (-libm::log(hottest) / pairs.max(1) as f64).max(1e-6);
-        Temper { kernels, replicas: Vec::new(), gaps: vec![libm::log(gap); pairs], rounds: 0 }
+        Temper { kernels, replicas: Vec::new(), saved: Vec::new(), gaps: vec![libm::log(gap); pairs], rounds: 0 }
     }
 
     /// The powers of the levels, the chain's own first.
@@ -52,8 +55,30 @@ impl Kernel for Temper {
         "temper".into()
     }
 
+    fn save(&self, trace: &Trace) -> Vec<u8> {
+        let replicas: Vec<_> = match &self.replicas[..] {
+            [] => self.saved.clone(),
+            all => all.iter().map(Trace::constraints).collect(),
+        };
+        let state = |level: usize| if level == 0 { trace } else { self.replicas.get(level - 1).unwrap_or(trace) };
+        let kernels: Vec<Vec<u8>> = self.kernels.iter().enumerate().map(|(level, k)| k.save(state(level))).collect();
+        pack(&(kernels, replicas, &self.gaps, self.rounds))
+    }
+
+    fn load(&mut self, state: &[u8]) -> Result<(), StateError> {
+        let (kernels, replicas, gaps, rounds): (Vec<Vec<u8>>, Vec<_>, Vec<f64>, u64) = unpack(state)?;
+        let fits = kernels.len() == self.kernels.len() && gaps.len() == self.gaps.len();
+        holds(fits && (replicas.is_empty() || replicas.len() == gaps.len()), "temper")?;
+        (self.saved, self.gaps, self.rounds) = (replicas, gaps, rounds);
+        self.replicas.clear();
+        self.kernels.iter_mut().zip(kernels).try_for_each(|(k, state)| k.load(&state))
+    }
+
     fn step(&mut self, trace: &mut Trace, at: &At) -> TraceResult<Outcome> {
         let pairs = self.gaps.len();
+        for state in std::mem::take(&mut self.saved) {
+            self.replicas.push(trace.another(state, at.draws(0))?);
+        }
         while self.replicas.len() < pairs {
             self.replicas.push(trace.clone());
         }

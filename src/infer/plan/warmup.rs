@@ -1,21 +1,22 @@
 //! Warm-up: loops whose draws are thrown away, in which kernels learn and the likelihood may be annealed.
 
-use super::{ChainError, Flow, PASS, PASSES, Runner};
+use super::ChainError;
+use super::place::Doing;
+use super::runner::{Flow, PASS, PASSES, Runner};
 use crate::infer::selection::fail;
 use crate::lang::value::Value;
 use crate::rng::{Purpose, Stream, StreamKey};
 use crate::syntax::ast::{Arg, Expr, KStmt};
 
 impl Runner<'_> {
-    pub(super) fn warmup(&mut self, count: &Expr, body: &[KStmt]) -> Result<Flow, ChainError> {
-        let passes = self.count(count)?;
+    pub(super) fn warmup(&mut self, count: &Expr, body: &[KStmt], doing: Doing) -> Result<Flow, ChainError> {
+        let (mut i, passes, first) = self.passes(count, doing)?;
         self.in_warmup = true;
         let mut flow = Flow::Next;
-        let (mut i, first) = (0, self.step);
         // More passes than the program says only if they get somewhere: a loop without kernels would never end.
         let unbounded = self.options.warmup.is_some();
         while i < passes || unbounded && (i == 0 || self.step > first) {
-            flow = self.pass(i, passes, body)?;
+            flow = self.pass((i, passes, first), body)?;
             i += 1;
             if flow != Flow::Next {
                 break;

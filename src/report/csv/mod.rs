@@ -10,10 +10,12 @@
 
 mod names;
 mod read;
+mod stream;
 mod write;
 
 pub use names::column_names;
 pub use read::{CsvError, read};
+pub use stream::{DrawReader, StreamError};
 pub use write::CsvSink;
 
 /// The columns about the draw itself, which come first.

@@ -67,7 +67,8 @@ pub fn read(text: &str) -> Result<ChainDraws, CsvError> {
     Ok(chain)
 }
 
-fn numbers(text: &str, line: usize, expected: usize) -> Result<DrawRow, CsvError> {
+/// A draw of so many recorded numbers; its chain and number are left 0.
+pub(super) fn numbers(text: &str, line: usize, expected: usize) -> Result<DrawRow, CsvError> {
     let parse = |s: &str| s.parse::<f64>().map_err(|_| CsvError::Number { line, text: s.chars().take(40).collect() });
     let all = text.split(',').map(parse).collect::<Result<Vec<f64>, _>>()?;
     match &all[..] {

@@ -16,6 +16,8 @@ pub struct CsvSink<W = File> {
     /// Numbers in a row; `None` before the columns are known.
     width: Option<usize>,
     line: String,
+    /// The bytes so far.
+    written: u64,
 }
 
 impl CsvSink {
@@ -26,6 +28,20 @@ impl CsvSink {
     /// If the file cannot be created or written.
     pub fn create(path: &Path, chain: u32, comments: &[(&str, String)]) -> io::Result<Self> {
         CsvSink::new(File::create(path)?, chain, comments)
+    }
+
+    /// Goes on with a file whose first `written` bytes are a chain's, and that ends there. The columns are those announced, if
+    /// they were.
+    pub(crate) fn resume(file: File, written: u64, columns: Option<&[Column]>) -> Self {
+        CsvSink { out: file, comments: String::new(), width: columns.map(width), line: String::new(), written }
+    }
+
+    /// Brings all draws so far to the disk.
+    ///
+    /// # Errors
+    /// If the system cannot.
+    pub(crate) fn sync(&self) -> io::Result<()> {
+        self.out.sync_data()
     }
 }
 
@@ -41,7 +57,13 @@ impl<W: Write> CsvSink<W> {
             let _ = writeln!(text, "# {key} = {value}");
         }
         out.write_all(text.as_bytes())?;
-        Ok(CsvSink { out, comments: text, width: None, line: String::new() })
+        let written = text.len() as u64;
+        Ok(CsvSink { out, comments: text, width: None, line: String::new(), written })
+    }
+
+    /// The bytes written so far.
+    pub(crate) fn written(&self) -> u64 {
+        self.written
     }
 
     /// The comments at the head of the file.
@@ -55,6 +77,7 @@ impl<W: Write + Send> Sink for CsvSink<W> {
         let names = DRAW_COLUMNS.map(String::from).into_iter().chain(column_names(columns));
         let line = names.collect::<Vec<_>>().join(",") + "\n";
         self.width = Some(width(columns));
+        self.written += line.len() as u64;
         self.out.write_all(line.as_bytes())
     }
 
@@ -71,6 +94,7 @@ impl<W: Write + Send> Sink for CsvSink<W> {
             let _ = write!(self.line, ",{x:?}");
         }
         self.line.push('\n');
+        self.written += self.line.len() as u64;
         self.out.write_all(self.line.as_bytes())
     }
 

@@ -28,7 +28,7 @@ impl Graph {
         let mut all: Vec<NodeId> =
             self.journal.iter().filter_map(|e| if let Entry::Node { id, .. } = e { Some(*id) } else { None }).collect();
         self.rollback(code, before);
-        all.sort_unstable();
+        self.sort_by_place(&mut all);
         all
     }
 

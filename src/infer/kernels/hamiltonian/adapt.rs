@@ -2,8 +2,10 @@
 //! from the variances of windows that double in length, as in Stan.
 
 use super::system::{self, Point, System};
+use crate::infer::state::{StateError, holds};
 use crate::rng::Stream;
 use crate::trace::TraceResult;
+use serde::{Deserialize, Serialize};
 
 /// Dual averaging's constants, as in Stan.
 const GAMMA: f64 = 0.05;
@@ -14,7 +16,7 @@ const KAPPA: f64 = 0.75;
 const BURN: u32 = 30;
 const WINDOW: u32 = 25;
 
-#[derive(Clone, Debug)]
+#[derive(Clone, Debug, Serialize, Deserialize)]
 pub(super) struct Adaptation {
     /// The mean acceptance aimed at.
     target: f64,
@@ -55,6 +57,18 @@ impl Adaptation {
             square: Vec::new(),
             count: 0.0,
         }
+    }
+
+    /// Takes the place of one that was made the same way.
+    ///
+    /// # Errors
+    /// If the sizes of what was read do not fit together.
+    pub fn take_up(&mut self, read: Adaptation) -> Result<(), StateError> {
+        let n = read.inverse_mass.len();
+        let sizes = read.signature.iter().try_fold(0usize, |sum, s| sum.checked_add(s.1));
+        holds(sizes == Some(n) && read.mean.len() == n && read.square.len() == n, "a step size and metric")?;
+        *self = Adaptation { target: self.target, fixed: self.fixed, ..read };
+        Ok(())
     }
 
     /// The step size to use now, found by trial when there is none yet.

@@ -4,6 +4,7 @@ use super::adapt::Adaptation;
 use super::summed::with_alternatives;
 use super::{Memory, Point, System};
 use crate::infer::kernel::{At, Kernel, Outcome, Pick, Registered, Scope};
+use crate::infer::state::{StateError, pack, unpack};
 use crate::rng::Stream;
 use crate::trace::{Selector, Target, Trace, TraceResult};
 use std::sync::Arc;
@@ -86,6 +87,16 @@ impl<T: Trajectory> Hamiltonian<T> {
 impl<T: Trajectory + Send> Kernel for Hamiltonian<T> {
     fn name(&self) -> String {
         self.trajectory.name().into()
+    }
+
+    fn save(&self, trace: &Trace) -> Vec<u8> {
+        pack(&(&self.adaptation, self.memory.habits(trace)))
+    }
+
+    fn load(&mut self, state: &[u8]) -> Result<(), StateError> {
+        let (adaptation, habits) = unpack(state)?;
+        self.memory = Memory::with(habits);
+        self.adaptation.take_up(adaptation)
     }
 
     fn step(&mut self, trace: &mut Trace, at: &At) -> TraceResult<Outcome> {

@@ -6,6 +6,7 @@
 
 use super::system::Point;
 use crate::trace::{Change, Recording, Target, Trace, Weight};
+use serde::{Deserialize, Serialize};
 use std::ops::Range;
 use std::sync::Arc;
 
@@ -50,6 +51,26 @@ impl Layout {
     }
 }
 
+/// What a checkpoint knows of a tape that there was.
+#[derive(Clone, Copy, Debug, Default, PartialEq, Eq, Serialize, Deserialize)]
+enum Kept {
+    #[default]
+    None,
+    /// One of the state the trace was in.
+    Present,
+    /// One of an earlier state.
+    Past,
+}
+
+/// How often tapes are recorded, which comes back with a checkpoint: the last bits of gradients hang on it.
+#[derive(Clone, Copy, Debug, Serialize, Deserialize)]
+pub(super) struct Habits {
+    runs: u32,
+    wait: u32,
+    waited: u32,
+    kept: Kept,
+}
+
 /// What a kernel keeps.
 #[derive(Debug, Default)]
 pub(super) struct Memory {
@@ -59,6 +80,7 @@ pub(super) struct Memory {
     /// How many recordings are left out, and how many were the last time.
     wait: u32,
     waited: u32,
+    kept: Kept,
     changes: Vec<(Target, Change)>,
     points: Vec<Arc<Point>>,
     lists: Vec<Arc<Vec<f64>>>,
@@ -72,6 +94,23 @@ impl Clone for Memory {
 }
 
 impl Memory {
+    /// What a checkpoint needs to know.
+    pub fn habits(&self, trace: &Trace) -> Habits {
+        let kept = match &self.tape {
+            None if self.kept == Kept::Present && !trace.is_new() => Kept::Past,
+            None => self.kept,
+            Some((tape, _)) if tape.holds(trace) => Kept::Present,
+            Some(_) => Kept::Past,
+        };
+        Habits { runs: self.runs, wait: self.wait, waited: self.waited, kept }
+    }
+
+    /// Goes on from a checkpoint.
+    pub fn with(habits: Habits) -> Memory {
+        let Habits { runs, wait, waited, kept } = habits;
+        Memory { runs, wait, waited, kept, ..Memory::default() }
+    }
+
     /// Takes up the tape of the last step, if it is still of this state and these choices, and gives the coordinates.
     pub fn stand(&mut self, trace: &Trace, asked: &[Target], y: &mut Vec<f64>) -> Option<Arc<Layout>> {
         let (tape, layout) = self.tape.as_mut()?;
@@ -81,14 +120,18 @@ impl Memory {
 
     /// Records a tape, if that has paid so far; false if there is none.
     pub fn record(&mut self, trace: &mut Trace, layout: &Arc<Layout>, y: &mut Vec<f64>) -> bool {
-        if self.tape.take().is_some() {
-            if self.runs < WORTH { self.back_off() } else { (self.wait, self.waited) = (0, 0) }
+        let kept = std::mem::take(&mut self.kept);
+        // One that a checkpoint had is no new one.
+        if kept != Kept::Present || !trace.is_new() {
+            if self.tape.take().is_some() || kept != Kept::None {
+                if self.runs < WORTH { self.back_off() } else { (self.wait, self.waited) = (0, 0) }
+            }
+            if self.wait > 0 {
+                self.wait -= 1;
+                return false;
+            }
+            self.runs = 0;
         }
-        if self.wait > 0 {
-            self.wait -= 1;
-            return false;
-        }
-        self.runs = 0;
         self.tape = trace.record(&layout.targets).map(|tape| (tape, Arc::clone(layout)));
         let told = self.tape.as_mut().is_some_and(|(tape, _)| tape.begin(trace, y));
         if !told {

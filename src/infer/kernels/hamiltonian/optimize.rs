@@ -5,6 +5,7 @@
 
 use super::{Memory, Point, System};
 use crate::infer::kernel::{At, Kernel, Outcome, Registered, Scope};
+use crate::infer::state::{StateError, pack, unpack};
 use crate::trace::{Trace, TraceResult};
 use std::collections::VecDeque;
 use std::sync::Arc;
@@ -78,6 +79,15 @@ fn climb(system: &mut System, from: &Point, along: &[f64]) -> TraceResult<Option
 impl Kernel for Optimize {
     fn name(&self) -> String {
         "optimize".into()
+    }
+
+    fn save(&self, trace: &Trace) -> Vec<u8> {
+        pack(&self.memory.habits(trace))
+    }
+
+    fn load(&mut self, state: &[u8]) -> Result<(), StateError> {
+        self.memory = Memory::with(unpack(state)?);
+        Ok(())
     }
 
     fn step(&mut self, trace: &mut Trace, at: &At) -> TraceResult<Outcome> {

@@ -1,0 +1,180 @@
+//! Checkpoints: all that a chain goes on from, so that its draws are those it would have made without a break.
+//!
+//! What is not here is a function of what is and of the program: a trace runs again from its choices, with scores that are
+//! equal bit for bit and lists of choices in the same order; random streams are told by step and address; caches fill again.
+
+use super::place::{Doing, Place};
+use super::runner::{Instance, Runner};
+use super::{ChainError, Progress, RunOptions};
+use crate::infer::draws::{Column, KernelStats, Sink, SiteStats};
+use crate::infer::plain::Plain;
+use crate::infer::population::Population;
+use crate::infer::state::{StateError, holds, pack, unpack};
+use crate::lang::code::Code;
+use crate::syntax::ast::KStmt;
+use crate::trace::{Constraint, Draws, Selector, Trace};
+use serde::{Deserialize, Serialize};
+use std::sync::Arc;
+use std::time::{Duration, Instant};
+
+type State = Vec<(u64, Constraint)>;
+
+/// The state of a chain at a step, and all it needs to go on. Of use with the same program, plan, data and seed only; what keeps it
+/// sees to that.
+#[derive(Clone, Debug, PartialEq, Serialize, Deserialize)]
+pub struct Checkpoint {
+    seed: u64,
+    chain: u32,
+    step: u64,
+    warmup_steps: u64,
+    draws: u64,
+    seconds: f64,
+    finished: bool,
+    power: f64,
+    /// The choices.
+    state: State,
+    best: Option<(f64, State)>,
+    population: Population,
+    variables: Vec<(Arc<str>, Plain)>,
+    path: Vec<Place>,
+    kernels: Vec<SavedKernel>,
+    sites: Vec<(u64, SiteStats)>,
+    columns: Vec<Column>,
+    frozen: Selector,
+    watch: Vec<u8>,
+}
+
+/// A kernel of a chain.
+#[derive(Clone, Debug, PartialEq, Serialize, Deserialize)]
+struct SavedKernel {
+    signature: String,
+    state: Vec<u8>,
+    stats: KernelStats,
+}
+
+impl Checkpoint {
+    /// That of a chain now, in the middle of a statement that is as far as `doing` says; `None` if there is more than plain data
+    /// among its variables.
+    pub(super) fn of(r: &Runner, doing: Option<Doing>) -> Option<Checkpoint> {
+        let plain = |(name, v): &(Arc<str>, _)| Some((Arc::clone(name), Plain::of(v)?));
+        let variables = r.variables.iter().map(plain).collect::<Option<_>>()?;
+        let mut path = r.path.clone();
+        if let (Some(last), Some(doing)) = (path.last_mut(), doing) {
+            last.doing = doing;
+        }
+        if path.iter().any(|p| matches!(p.doing, Doing::Items { all: None, .. })) {
+            return None;
+        }
+        let kernel = |i: &Instance| {
+            let (state, evidence) = match &i.kernel {
+                Some(k) => (k.save(&r.trace), k.log_evidence()),
+                None => (i.saved.clone(), i.stats.log_evidence),
+            };
+            let stats = KernelStats { log_evidence: evidence, ..i.stats.clone() };
+            SavedKernel { signature: i.signature.clone(), state, stats }
+        };
+        Some(Checkpoint {
+            seed: r.options.seed,
+            chain: r.chain,
+            step: r.step,
+            warmup_steps: r.warmup_steps,
+            draws: r.draws,
+            seconds: r.started.elapsed().as_secs_f64(),
+            finished: r.finished,
+            power: r.power,
+            state: r.trace.constraints(),
+            best: r.best.clone(),
+            population: r.population.clone(),
+            variables,
+            path,
+            kernels: r.instances.iter().map(kernel).collect(),
+            sites: r.sites.list(),
+            columns: r.recorder.columns().to_vec(),
+            frozen: r.frozen.clone(),
+            watch: r.options.watch.as_ref().map(|w| w.save(r.chain)).unwrap_or_default(),
+        })
+    }
+
+    /// As bytes.
+    pub fn to_bytes(&self) -> Vec<u8> {
+        pack(self)
+    }
+
+    /// From the bytes of [`Checkpoint::to_bytes`].
+    ///
+    /// # Errors
+    /// If they are others.
+    pub fn from_bytes(bytes: &[u8]) -> Result<Checkpoint, StateError> {
+        let c: Checkpoint = unpack(bytes)?;
+        holds(c.warmup_steps <= c.step && c.population.fits(), "a chain")?;
+        Ok(c)
+    }
+
+    /// The chain, from 0.
+    pub fn chain(&self) -> u32 {
+        self.chain
+    }
+
+    /// The draws it has made.
+    pub fn draws(&self) -> u64 {
+        self.draws
+    }
+
+    /// What is recorded with each of them; empty before the first.
+    pub fn columns(&self) -> &[Column] {
+        &self.columns
+    }
+
+    /// Its steps, warm-up included.
+    pub fn steps(&self) -> u64 {
+        self.step
+    }
+
+    /// Whether its plan is done.
+    pub fn is_finished(&self) -> bool {
+        self.finished
+    }
+}
+
+impl<'a> Runner<'a> {
+    /// A chain that goes on from a checkpoint.
+    ///
+    /// # Errors
+    /// If it is of another seed or chain, or the program fails with its choices.
+    pub fn resume(
+        code: &'a Arc<Code>,
+        plan: &[KStmt],
+        options: &'a RunOptions,
+        progress: &'a Progress,
+        sink: &'a mut dyn Sink,
+        chain: u32,
+        c: Checkpoint,
+    ) -> Result<Self, ChainError> {
+        if (c.seed, c.chain) != (options.seed, chain) {
+            let message = format!("the checkpoint is of chain {} under seed {}", u64::from(c.chain) + 1, c.seed);
+            return Err(StateError::new(message).into());
+        }
+        let count = c.state.len();
+        let (trace, _) = Trace::generate(Arc::clone(code), c.state, Draws::default(), options.limits)?;
+        if trace.choice_count() != count {
+            return Err(StateError::new("the checkpoint has other choices than the program").into());
+        }
+        if let Some(watch) = &options.watch {
+            watch.load(chain, &c.watch)?;
+        }
+        let past = Duration::try_from_secs_f64(c.seconds).unwrap_or_default();
+        let now = Instant::now();
+        let started = now.checked_sub(past).unwrap_or(now);
+        let mut runner = Runner::new(code, plan, options, progress, sink, (chain, started), (trace, c.population));
+        runner.variables = c.variables.into_iter().map(|(name, v)| (name, v.value())).collect();
+        runner.way = c.path.into();
+        let saved = |k: SavedKernel| Instance { signature: k.signature, kernel: None, saved: k.state, stats: k.stats };
+        runner.instances = c.kernels.into_iter().map(saved).collect();
+        runner.sites.load(c.sites);
+        runner.recorder.set_columns(c.columns);
+        runner.frozen = c.frozen;
+        (runner.step, runner.warmup_steps, runner.draws) = (c.step, c.warmup_steps, c.draws);
+        (runner.power, runner.best, runner.finished) = (c.power, c.best, c.finished);
+        Ok(runner)
+    }
+}

@@ -1,0 +1,417 @@
+//! A chain at work on a plan, statement by statement.
+
+use super::checkpoint::Checkpoint;
+use super::place::{Doing, Place};
+use super::{ChainError, ChainResult, Progress, RunOptions};
+use crate::infer::draws::{DrawRow, KernelStats, Sink};
+use crate::infer::expr::{Scope, evaluate};
+use crate::infer::kernel::{At, Kernel};
+use crate::infer::plain::Plain;
+use crate::infer::population::Population;
+use crate::infer::record::Recorder;
+use crate::infer::selection::{fail, selector};
+use crate::infer::sites::Sites;
+use crate::infer::state::StateError;
+use crate::lang::code::Code;
+use crate::lang::error::RunError;
+use crate::lang::value::Value;
+use crate::rng::{Purpose, StreamKey};
+use crate::syntax::ast::{Expr, KStmt, KStmtKind};
+use crate::trace::{Constraint, Draws, Selector, Trace};
+use rustc_hash::FxHashMap;
+use std::collections::VecDeque;
+use std::sync::Arc;
+use std::sync::atomic::Ordering;
+use std::time::Instant;
+
+/// How a statement ended.
+#[derive(Clone, Copy, Debug, PartialEq, Eq)]
+pub(super) enum Flow {
+    Next,
+    /// `stop`: the enclosing loop ends.
+    Stop,
+    /// The run ends: steps or time used up, or cancelled.
+    End,
+}
+
+/// A kernel that has run, what tells it from others, and what it did.
+pub(super) struct Instance {
+    pub signature: String,
+    /// `None` if a checkpoint had it and it was not asked for since.
+    pub kernel: Option<Box<dyn Kernel>>,
+    /// What a checkpoint knows of it, until it is asked for.
+    pub saved: Vec<u8>,
+    pub stats: KernelStats,
+}
+
+impl Instance {
+    fn into_stats(self) -> KernelStats {
+        match self.kernel {
+            Some(kernel) => KernelStats { log_evidence: kernel.log_evidence(), ..self.stats },
+            None => self.stats,
+        }
+    }
+}
+
+pub(super) struct Runner<'a> {
+    pub code: &'a Arc<Code>,
+    pub options: &'a RunOptions,
+    pub progress: &'a Progress,
+    pub sink: &'a mut dyn Sink,
+    pub chain: u32,
+    pub trace: Trace,
+    pub variables: Vec<(Arc<str>, Value)>,
+    pub instances: Vec<Instance>,
+    /// By the place of a call that always means the same: its kernel.
+    pub calls: FxHashMap<usize, usize>,
+    pub sites: Sites,
+    pub recorder: Recorder,
+    pub frozen: Selector,
+    pub started: Instant,
+    pub step: u64,
+    pub warmup_steps: u64,
+    pub in_warmup: bool,
+    loops: u32,
+    pub power: f64,
+    pub population: Population,
+    pub best: Option<(f64, Vec<(u64, Constraint)>)>,
+    pub draws: u64,
+    /// The statements being run, the outermost first.
+    pub path: Vec<Place>,
+    /// Where a checkpoint says to go on, the outermost first; empty once the chain is there.
+    pub way: VecDeque<Place>,
+    /// Whether the plan is done.
+    pub finished: bool,
+    /// The checkpoints asked for so far.
+    pub asked: u64,
+}
+
+impl<'a> Runner<'a> {
+    /// A chain at the beginning of a plan.
+    pub fn new(
+        code: &'a Arc<Code>,
+        plan: &[KStmt],
+        options: &'a RunOptions,
+        progress: &'a Progress,
+        sink: &'a mut dyn Sink,
+        (chain, started): (u32, Instant),
+        (mut trace, population): (Trace, Population),
+    ) -> Self {
+        trace.set_incremental(options.incremental);
+        Runner {
+            code,
+            options,
+            progress,
+            sink,
+            chain,
+            trace,
+            variables: Vec::new(),
+            instances: Vec::new(),
+            calls: FxHashMap::default(),
+            sites: Sites::default(),
+            recorder: Recorder::new(code, plan),
+            frozen: Selector::Nothing,
+            started,
+            step: 0,
+            warmup_steps: 0,
+            in_warmup: false,
+            loops: 0,
+            power: 1.0,
+            population,
+            best: None,
+            draws: 0,
+            path: Vec::new(),
+            way: VecDeque::new(),
+            finished: false,
+            asked: 0,
+        }
+    }
+
+    /// Runs the plan to its end.
+    ///
+    /// # Errors
+    /// If the program fails, or the sink does.
+    pub fn run(mut self, plan: &[KStmt]) -> Result<ChainResult, ChainError> {
+        if !self.finished {
+            let flow = self.body(plan)?;
+            if !self.way.is_empty() {
+                return Err(StateError::new("the checkpoint is of another plan").into());
+            }
+            self.finished = flow != Flow::End;
+            if self.draws == 0 {
+                self.record(None)?;
+            }
+            if self.finished {
+                self.keep(None)?;
+            }
+        }
+        let seconds = self.started.elapsed().as_secs_f64();
+        let (steps, warmup) = (self.step - self.warmup_steps, self.warmup_steps);
+        self.sink.chain_done(self.chain, steps, warmup, seconds).map_err(ChainError::Sink)?;
+        Ok(ChainResult {
+            last: self.trace,
+            best: self.best,
+            steps,
+            warmup,
+            draws: self.draws,
+            kernels: self.instances.into_iter().map(Instance::into_stats).collect(),
+            sites: self.sites.into_stats(),
+            seconds,
+        })
+    }
+
+    pub fn at(&self) -> At {
+        let at = At::new(self.options.seed, self.chain, self.step);
+        At { adapting: self.in_warmup, power: self.power, ..at }
+    }
+
+    pub fn predictive(&self) -> Draws {
+        let key = StreamKey::new(self.options.seed, self.chain, Purpose::PREDICT);
+        Draws { key, step: self.step, lane: 0 }
+    }
+
+    /// What expressions can see.
+    pub fn env(&mut self) -> Scope<'_> {
+        let draws = self.predictive();
+        let (started, steps) = (self.started, self.step);
+        Scope {
+            code: self.code,
+            trace: &mut self.trace,
+            variables: &self.variables,
+            draws,
+            started,
+            steps,
+            moved: None,
+        }
+    }
+
+    pub fn value(&mut self, e: &Expr) -> Result<Value, Box<RunError>> {
+        evaluate(e, &mut self.env())
+    }
+
+    pub fn count(&mut self, e: &Expr) -> Result<u64, Box<RunError>> {
+        match self.value(e)? {
+            Value::Num(x) if x >= 0.0 && x == libm::trunc(x) => Ok(x as u64),
+            v => Err(fail(e.span, format!("a whole number of times was expected, got {v}"))),
+        }
+    }
+
+    /// Applies the program's `freeze`.
+    pub fn freeze(&mut self) -> Result<(), ChainError> {
+        for f in &self.code.freezes {
+            let s = selector(f, &mut self.env())?;
+            self.frozen = match std::mem::replace(&mut self.frozen, Selector::Nothing) {
+                Selector::Nothing => s,
+                old => Selector::Union(Box::new(old), Box::new(s)),
+            };
+        }
+        Ok(())
+    }
+
+    /// Runs statements one after the other, from the one where a checkpoint says to go on.
+    pub fn body(&mut self, stmts: &[KStmt]) -> Result<Flow, ChainError> {
+        let level = self.path.len();
+        let mut back = self.way.pop_front();
+        let first = back.as_ref().map_or(0, |p| p.statement);
+        for (statement, s) in stmts.iter().enumerate().skip(first) {
+            let place = back.take().unwrap_or(Place { statement, depth: self.variables.len(), doing: Doing::Begins });
+            let doing = place.doing.clone();
+            self.path.truncate(level);
+            self.path.push(place);
+            match self.statement(s, doing)? {
+                Flow::Next => {}
+                flow => {
+                    self.path.truncate(level);
+                    return Ok(flow);
+                }
+            }
+        }
+        self.path.truncate(level);
+        Ok(Flow::Next)
+    }
+
+    /// Says how far the present statement is.
+    pub fn note(&mut self, doing: Doing) {
+        if let Some(place) = self.path.last_mut() {
+            place.doing = doing;
+        }
+    }
+
+    /// Goes back to the variables there were when the present statement began.
+    pub fn leave(&mut self) {
+        let depth = self.path.last().map_or(0, |p| p.depth);
+        self.variables.truncate(depth);
+    }
+
+    fn statement(&mut self, s: &KStmt, doing: Doing) -> Result<Flow, ChainError> {
+        match &s.kind {
+            KStmtKind::Warmup { count, body } => self.warmup(count, body, doing),
+            KStmtKind::Repeat { count, body } => self.repeat(count, body, doing),
+            KStmtKind::Every { count, body } => {
+                // Going on within it, it is known to be its turn.
+                if !self.way.is_empty() {
+                    return self.body(body);
+                }
+                let n = self.count(count)?.max(1);
+                let pass = self.variables.iter().rev().find(|(name, _)| &**name == PASS);
+                match pass {
+                    Some((_, Value::Num(i))) if (*i as u64 + 1).is_multiple_of(n) => self.body(body),
+                    _ => Ok(Flow::Next),
+                }
+            }
+            KStmtKind::Mix(arms) => self.mix(arms, doing),
+            KStmtKind::For { var, iter, body } => {
+                let (begin, items) = match doing {
+                    Doing::Items { item, all: Some(all) } => (item, all.iter().map(Plain::value).collect()),
+                    _ => (0, self.value(iter)?.passes()),
+                };
+                let all: Option<Vec<Plain>> = items.iter().map(Plain::of).collect();
+                let all: Option<Arc<[Plain]>> = all.map(Arc::from);
+                for (item, value) in items.into_iter().enumerate().skip(begin) {
+                    self.note(Doing::Items { item, all: all.clone() });
+                    if self.way.is_empty() {
+                        self.variables.push((Arc::clone(&var.node), value));
+                    }
+                    let flow = self.body(body)?;
+                    self.leave();
+                    match flow {
+                        Flow::Next => {}
+                        Flow::Stop => break,
+                        Flow::End => return Ok(Flow::End),
+                    }
+                }
+                Ok(Flow::Next)
+            }
+            KStmtKind::StopWhen(cond) => match self.value(cond)? {
+                Value::Bool(true) => Ok(Flow::Stop),
+                Value::Bool(false) => Ok(Flow::Next),
+                v => Err(fail(cond.span, format!("`stop when` needs a bool, got {}", v.type_name())).into()),
+            },
+            KStmtKind::Collect(exprs) => {
+                if !self.in_warmup {
+                    self.record(Some(exprs))?;
+                }
+                Ok(Flow::Next)
+            }
+            KStmtKind::Let { name, expr } => {
+                let v = self.value(expr)?;
+                self.variables.push((Arc::clone(&name.node), v));
+                Ok(Flow::Next)
+            }
+            KStmtKind::Propose { .. } | KStmtKind::Map { .. } => {
+                Err(fail(s.span, "`propose` belongs in a kernel".into()).into())
+            }
+            KStmtKind::Expr(e) => self.apply(e, None, doing),
+        }
+    }
+
+    /// Where a loop of `count` passes is: at its first, or where a checkpoint says.
+    pub fn passes(&mut self, count: &Expr, doing: Doing) -> Result<(u64, u64, u64), ChainError> {
+        match doing {
+            Doing::Loop { pass, of, first } => Ok((pass, of, first)),
+            _ => Ok((0, self.count(count)?, self.step)),
+        }
+    }
+
+    fn repeat(&mut self, count: &Expr, body: &[KStmt], doing: Doing) -> Result<Flow, ChainError> {
+        let (mut i, passes, first) = self.passes(count, doing)?;
+        let outermost = self.loops == 0 && !self.in_warmup;
+        let unbounded = outermost && (self.options.steps.is_some() || self.options.time.is_some());
+        while i < passes || unbounded && (i == 0 || self.step > first) {
+            let flow = self.pass((i, passes, first), body)?;
+            i += 1;
+            match flow {
+                Flow::Next => {}
+                Flow::Stop => break,
+                Flow::End => return Ok(Flow::End),
+            }
+            if outermost && !self.recorder.collects() {
+                self.record(None)?;
+            }
+        }
+        Ok(Flow::Next)
+    }
+
+    /// One pass of a loop.
+    pub fn pass(&mut self, (i, of, first): (u64, u64, u64), body: &[KStmt]) -> Result<Flow, ChainError> {
+        self.note(Doing::Loop { pass: i, of, first });
+        if self.way.is_empty() {
+            if self.is_over() {
+                self.keep(None)?;
+                return Ok(Flow::End);
+            }
+            self.variables.push((Arc::from(PASS), Value::Num(i as f64)));
+            self.variables.push((Arc::from(PASSES), Value::Num(of as f64)));
+        }
+        self.loops += 1;
+        let flow = self.body(body);
+        self.loops -= 1;
+        self.leave();
+        flow
+    }
+
+    pub fn is_cancelled(&self) -> bool {
+        self.progress.cancelled.load(Ordering::Relaxed)
+    }
+
+    /// Whether the run, or the warm-up, has used up what it was given.
+    pub fn is_over(&self) -> bool {
+        if self.is_cancelled() {
+            return true;
+        }
+        let used = self.step - self.warmup_steps;
+        let bound = if self.in_warmup { self.options.warmup } else { self.options.steps };
+        if bound.is_some_and(|n| used >= n) {
+            return true;
+        }
+        match self.options.time {
+            Some(t) => self.started.elapsed() >= if self.in_warmup { t / 2 } else { t },
+            None => false,
+        }
+    }
+
+    /// Hands over a checkpoint, if the sink wants any: of the present statement begun, or as far as `doing` says. A chain whose
+    /// plan holds more than plain data in its variables has none.
+    pub fn keep(&mut self, doing: Option<Doing>) -> Result<(), ChainError> {
+        if !self.sink.takes_checkpoints() {
+            return Ok(());
+        }
+        if let Some(checkpoint) = Checkpoint::of(self, doing) {
+            self.sink.checkpoint(&checkpoint).map_err(ChainError::Sink)?;
+        }
+        Ok(())
+    }
+
+    /// Records a draw.
+    pub fn record(&mut self, exprs: Option<&[Expr]>) -> Result<(), ChainError> {
+        let draws = self.predictive();
+        let values = self.recorder.values(self.code, &mut self.trace, exprs, draws)?;
+        if self.draws == 0 {
+            self.recorder.fix_columns(&values);
+            self.sink.columns(self.recorder.columns()).map_err(ChainError::Sink)?;
+        }
+        let log_joint = self.trace.log_joint();
+        let row = DrawRow {
+            chain: self.chain,
+            draw: self.draws,
+            step: self.step,
+            log_joint,
+            log_prior: self.trace.log_prior(),
+            log_likelihood: self.trace.log_likelihood(),
+            values: self.recorder.flatten(&values),
+        };
+        self.sink.draw(&row).map_err(ChainError::Sink)?;
+        if let Some(watch) = &self.options.watch {
+            watch.draw(self.chain, &mut self.trace, draws);
+        }
+        self.draws += 1;
+        if self.best.as_ref().is_none_or(|(b, _)| log_joint > *b) {
+            self.best = Some((log_joint, self.trace.constraints()));
+        }
+        Ok(())
+    }
+}
+
+/// The variables a loop keeps for `every` and `anneal`; not names a program can write.
+pub(super) const PASS: &str = "#pass";
+pub(super) const PASSES: &str = "#passes";

@@ -1,0 +1,57 @@
+//! What kernels remember, as bytes of a checkpoint.
+
+use serde::Serialize;
+use serde::de::DeserializeOwned;
+
+/// Bytes that are not what a kernel, or a chain, wrote.
+#[derive(Clone, Debug, PartialEq, Eq, thiserror::Error)]
+#[error("{0}")]
+pub struct StateError(pub String);
+
+impl StateError {
+    /// A state of a form that cannot be.
+    pub fn new(message: impl Into<String>) -> Self {
+        StateError(message.into())
+    }
+}
+
+/// A value as bytes (CBOR, RFC 8949: exact for all numbers, and its reader bounds how deep it goes).
+pub(crate) fn pack<T: Serialize>(value: &T) -> Vec<u8> {
+    let mut bytes = Vec::new();
+    // Writing to memory does not fail, and no type here refuses to be written.
+    let _ = ciborium::into_writer(value, &mut bytes);
+    bytes
+}
+
+/// The value that [`pack`] was given.
+///
+/// # Errors
+/// If it was not given one of this type.
+pub(crate) fn unpack<T: DeserializeOwned>(bytes: &[u8]) -> Result<T, StateError> {
+    ciborium::from_reader(bytes).map_err(|e| StateError(e.to_string()))
+}
+
+/// Whether something holds, as a state that is read must.
+pub(crate) fn holds(condition: bool, what: &str) -> Result<(), StateError> {
+    if condition { Ok(()) } else { Err(StateError::new(format!("the state of {what} does not fit together"))) }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    #[test]
+    fn numbers_come_back_bit_for_bit() {
+        let all = [0.0, -0.0, 0.1, f64::MIN_POSITIVE / 3.0, f64::MAX, f64::INFINITY, f64::NEG_INFINITY, f64::NAN];
+        let back: Vec<f64> = unpack(&pack(&all.to_vec())).unwrap();
+        assert!(all.iter().zip(&back).all(|(a, b)| a.to_bits() == b.to_bits()), "{back:?}");
+        assert!(unpack::<Vec<f64>>(&[0xff, 0]).is_err());
+    }
+
+    #[test]
+    fn what_is_too_deep_is_refused() {
+        // Arrays of one array, a hundred thousand deep.
+        let deep = vec![0x81; 100_000];
+        assert!(unpack::<crate::dist::Datum>(&deep).is_err());
+    }
+}

@@ -1,0 +1,137 @@
+//! The files of one chain in a run's folder: its draws, and the checkpoint it can go on from.
+//!
+//! Invariant: the checkpoint is whole, and what it says is in the file of draws is there, whenever the process or the machine stops.
+
+use super::checkpoint::SavedChain;
+use super::csv::{CsvSink, DrawReader};
+use super::rundir::RunDir;
+use super::sinks::Memory;
+use crate::infer::Checkpoint;
+use crate::infer::draws::{Column, DrawRow, Sink};
+use std::fs::File;
+use std::io::{self, BufReader, Seek, SeekFrom};
+
+/// A sink that writes a chain's draws to its file, keeps as many as there is room for in memory, and keeps checkpoints.
+pub struct ChainFile {
+    dir: RunDir,
+    chain: u32,
+    /// What tells the run from others.
+    run: String,
+    draws: CsvSink,
+    memory: Memory,
+    from: Option<Checkpoint>,
+}
+
+/// The name of a chain's draws; chains are counted from 0.
+fn draws_name(chain: u32) -> String {
+    format!("chain-{}.csv", u64::from(chain) + 1)
+}
+
+fn checkpoint_name(chain: u32) -> String {
+    format!("chain-{}.checkpoint", u64::from(chain) + 1)
+}
+
+/// An error with the name of the file it is about.
+fn about(name: &str, error: impl std::fmt::Display, kind: io::ErrorKind) -> io::Error {
+    io::Error::new(kind, format!("{name}: {error}"))
+}
+
+impl ChainFile {
+    /// Begins the files of a chain.
+    ///
+    /// # Errors
+    /// If they cannot be written.
+    pub fn begin(
+        dir: &RunDir,
+        chain: u32,
+        run: &str,
+        comments: &[(&str, String)],
+        memory: &Memory,
+    ) -> io::Result<ChainFile> {
+        let name = draws_name(chain);
+        let told = |e: io::Error| about(&name, &e, e.kind());
+        // An earlier checkpoint must not outlive the draws it is of.
+        let checkpoint = dir.file(&checkpoint_name(chain));
+        if checkpoint.exists() {
+            std::fs::remove_file(checkpoint)?;
+        }
+        let draws = CsvSink::create(&dir.file(&name), chain, comments).map_err(told)?;
+        Ok(ChainFile { dir: dir.clone(), chain, run: run.into(), draws, memory: memory.clone(), from: None })
+    }
+
+    /// Takes up the files of a chain where its last checkpoint was; without one it begins anew. Draws after it are cut off: the chain
+    /// makes them again.
+    ///
+    /// # Errors
+    /// If the checkpoint is of another run or version, or the draws before it are not there.
+    pub fn resume(
+        dir: &RunDir,
+        chain: u32,
+        run: &str,
+        comments: &[(&str, String)],
+        memory: &Memory,
+    ) -> io::Result<ChainFile> {
+        let name = checkpoint_name(chain);
+        let bytes = match std::fs::read(dir.file(&name)) {
+            Ok(bytes) => bytes,
+            Err(e) if e.kind() == io::ErrorKind::NotFound => {
+                return ChainFile::begin(dir, chain, run, comments, memory);
+            }
+            Err(e) => return Err(about(&name, &e, e.kind())),
+        };
+        let read = SavedChain::read(&bytes, run);
+        let (saved, checkpoint) = read.map_err(|e| about(&name, e, io::ErrorKind::InvalidData))?;
+        let name = draws_name(chain);
+        let told = |e: io::Error| about(&name, &e, e.kind());
+        let mut file = File::options().read(true).write(true).open(dir.file(&name)).map_err(told)?;
+        let mut memory = memory.clone();
+        memory.columns(checkpoint.columns())?;
+        let mut rows = 0;
+        let mut reader = DrawReader::new(BufReader::new(&file), checkpoint.columns(), saved.draws_end);
+        while let Some(row) = reader.next_row().map_err(|e| about(&name, e, io::ErrorKind::InvalidData))? {
+            memory.draw(&DrawRow { chain, draw: rows, ..row })?;
+            rows += 1;
+        }
+        if rows != checkpoint.draws() || reader.position() != saved.draws_end {
+            let message = format!("it has {rows} draws, not the {} of the checkpoint", checkpoint.draws());
+            return Err(about(&name, message, io::ErrorKind::InvalidData));
+        }
+        file.set_len(saved.draws_end).map_err(told)?;
+        file.seek(SeekFrom::End(0)).map_err(told)?;
+        let columns = (checkpoint.draws() > 0).then(|| checkpoint.columns());
+        let draws = CsvSink::resume(file, saved.draws_end, columns);
+        Ok(ChainFile { dir: dir.clone(), chain, run: run.into(), draws, memory, from: Some(checkpoint) })
+    }
+}
+
+impl Sink for ChainFile {
+    fn columns(&mut self, columns: &[Column]) -> io::Result<()> {
+        self.draws.columns(columns)?;
+        self.memory.columns(columns)
+    }
+
+    fn draw(&mut self, row: &DrawRow) -> io::Result<()> {
+        self.draws.draw(row)?;
+        self.memory.draw(row)
+    }
+
+    fn chain_done(&mut self, chain: u32, steps: u64, warmup: u64, seconds: f64) -> io::Result<()> {
+        self.draws.chain_done(chain, steps, warmup, seconds)?;
+        self.memory.chain_done(chain, steps, warmup, seconds)
+    }
+
+    fn resume(&mut self) -> io::Result<Option<Checkpoint>> {
+        Ok(self.from.take())
+    }
+
+    fn takes_checkpoints(&self) -> bool {
+        true
+    }
+
+    fn checkpoint(&mut self, checkpoint: &Checkpoint) -> io::Result<()> {
+        // Draws reach the disk before the checkpoint that counts on them.
+        self.draws.sync()?;
+        let saved = SavedChain::new(&self.run, self.draws.written(), checkpoint);
+        self.dir.write(&checkpoint_name(self.chain), &saved.to_bytes()).map_err(io::Error::other)
+    }
+}

@@ -1,0 +1,109 @@
+//! The file of a checkpoint: what a chain goes on from, and what tells that it is this run's and whole.
+//!
+//! A line of text that says what the file is; the version of the format and a hash of the rest; the rest (CBOR): the version of
+//! pcadlang, the run it belongs to, the length of its file of draws, the chain. Only the version that wrote it goes on from it: another
+//! may draw other numbers.
+
+use super::hash::bytes_hash;
+use crate::infer::{Checkpoint, StateError};
+use serde::{Deserialize, Serialize};
+
+const HEAD: &[u8] = b"pcadlang checkpoint 1\n";
+const VERSION: &str = env!("CARGO_PKG_VERSION");
+/// The length of a hash.
+const HASH: usize = 16;
+
+/// Why a file is no checkpoint to go on from.
+#[derive(Debug, thiserror::Error)]
+pub enum CheckpointError {
+    /// It begins with something else.
+    #[error("this is no checkpoint of a chain, or one in another format")]
+    Format,
+    /// Its contents have changed since it was written.
+    #[error("the checkpoint is damaged")]
+    Damaged,
+    /// It was written by another version.
+    #[error("the checkpoint was written by pcadlang {0}; this is {VERSION}, whose chains may differ")]
+    Version(String),
+    /// It belongs to another program, data or settings.
+    #[error("the checkpoint belongs to another run: the program, its data or its settings were others")]
+    Run,
+    /// It does not fit together.
+    #[error("the checkpoint cannot be read: {0}")]
+    State(#[from] StateError),
+}
+
+/// What a file of a checkpoint holds.
+#[derive(Clone, Debug, PartialEq, Serialize, Deserialize)]
+pub struct SavedChain {
+    version: String,
+    run: String,
+    /// The bytes of the file of draws that come before it.
+    pub draws_end: u64,
+    chain: Vec<u8>,
+}
+
+impl SavedChain {
+    /// A checkpoint of a run, with so many bytes of draws before it.
+    pub fn new(run: &str, draws_end: u64, checkpoint: &Checkpoint) -> SavedChain {
+        SavedChain { version: VERSION.into(), run: run.into(), draws_end, chain: checkpoint.to_bytes() }
+    }
+
+    /// The file.
+    pub fn to_bytes(&self) -> Vec<u8> {
+        let mut body = Vec::new();
+        // Writing to memory does not fail.
+        let _ = ciborium::into_writer(self, &mut body);
+        [HEAD, bytes_hash(&body).as_bytes(), &body].concat()
+    }
+
+    /// Reads the file of a checkpoint of a run.
+    ///
+    /// # Errors
+    /// If it is none, damaged, or of another version or run.
+    pub fn read(bytes: &[u8], run: &str) -> Result<(SavedChain, Checkpoint), CheckpointError> {
+        let rest = bytes.strip_prefix(HEAD).ok_or(CheckpointError::Format)?;
+        let (hash, body) = rest.split_at_checked(HASH).ok_or(CheckpointError::Damaged)?;
+        if bytes_hash(body).as_bytes() != hash {
+            return Err(CheckpointError::Damaged);
+        }
+        let saved: SavedChain = ciborium::from_reader(body).map_err(|e| StateError(e.to_string()))?;
+        if saved.version != VERSION {
+            return Err(CheckpointError::Version(saved.version));
+        }
+        if saved.run != run {
+            return Err(CheckpointError::Run);
+        }
+        let checkpoint = Checkpoint::from_bytes(&saved.chain)?;
+        Ok((saved, checkpoint))
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    #[test]
+    fn what_is_wrong_is_told() {
+        let saved = SavedChain { version: VERSION.into(), run: "a".into(), draws_end: 7, chain: vec![0xff] };
+        let whole = saved.to_bytes();
+        let error = |bytes: &[u8], run: &str| SavedChain::read(bytes, run).unwrap_err();
+        assert!(matches!(error(b"lp__,x\n", "a"), CheckpointError::Format));
+        assert!(matches!(error(&[], "a"), CheckpointError::Format));
+        for cut in HEAD.len()..whole.len() {
+            assert!(matches!(error(&whole[..cut], "a"), CheckpointError::Damaged), "{cut}");
+        }
+        for i in HEAD.len()..whole.len() {
+            let mut changed = whole.clone();
+            changed[i] ^= 1;
+            assert!(matches!(error(&changed, "a"), CheckpointError::Damaged), "{i}");
+        }
+        assert!(matches!(error(&whole, "b"), CheckpointError::Run));
+        assert!(matches!(error(&whole, "a"), CheckpointError::State(_)));
+        let other = SavedChain { version: "0.0.1".into(), ..saved }.to_bytes();
+        assert_eq!(
+            error(&other, "a").to_string(),
+            format!("the checkpoint was written by pcadlang 0.0.1; this is {VERSION}, whose chains may differ")
+        );
+    }
+}
