@@ -21,13 +21,14 @@ use crate::lang::load::{Disk, Loaded, Loader, Nowhere, load, load_text, read, re
 use crate::lang::lower::{Compiled, Export, Inputs, Interface, Report, compile, inspect};
 use crate::lang::value::Value;
 use crate::render::Camera;
-use crate::report::{ChainDraws, Memory, Quantity, quantities, text_hash};
+use crate::report::{ChainDraws, Memory, Quantity, bytes_hash, quantities, text_hash};
 use crate::rng::{Purpose, StreamKey};
 use crate::syntax::ast::KStmt;
 use crate::syntax::parse;
 use crate::trace::{Draws, Limits, Trace};
 use indexmap::IndexMap;
 use rustc_hash::FxHashMap;
+use std::cell::RefCell;
 use std::fmt;
 use std::sync::Arc;
 
@@ -238,11 +239,15 @@ impl Program {
     pub fn compile(mut self) -> Result<Model, Error> {
         self.default_camera();
         let loader = &*self.loader;
+        let data_hash = RefCell::new(String::new());
         let read_data = |kind: &str, path: &str, folder: &str, options: &Options| {
             let beside = format!("{folder}{path}");
             let file = data::path_of(kind, &beside);
             match read(loader, file) {
-                Ok((bytes, _)) => data::load(kind, &beside, &bytes, options, &|other| sibling(loader, &beside, other)),
+                Ok((bytes, _)) => {
+                    data_hash.borrow_mut().push_str(&bytes_hash(&bytes));
+                    data::load(kind, &beside, &bytes, options, &|other| sibling(loader, &beside, other))
+                }
                 Err(e) => Err(Fault::new(FaultKind::Other, format!("cannot read {file}: {}", reason(&e)))),
             }
         };
@@ -257,7 +262,8 @@ impl Program {
         match compile(&self.loaded, inputs, &mut self.sources) {
             Ok(compiled) => {
                 let hash = hash_of(&self.loaded, &self.sources, &self.sets);
-                Ok(Model { compiled, sources: self.sources, text: self.text, hash })
+                let data_hash = data_hash.into_inner();
+                Ok(Model { compiled, sources: self.sources, text: self.text, hash, data_hash })
             }
             Err(diagnostics) => Err(Error { diagnostics, sources: self.sources }),
         }
@@ -299,6 +305,7 @@ pub struct Model {
     sources: SourceMap,
     text: String,
     hash: String,
+    data_hash: String,
 }
 
 impl Model {
@@ -318,6 +325,11 @@ impl Model {
     /// A hash of the program's text and settings.
     pub fn hash(&self) -> &str {
         &self.hash
+    }
+
+    /// A hash of the files that the program reads by itself: the defaults of its `data` items.
+    pub fn data_hash(&self) -> &str {
+        &self.data_hash
     }
 
     /// The text of the main file.

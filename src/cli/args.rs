@@ -108,6 +108,13 @@ pub struct Run {
     /// The folder for results; runs/PROG if left out
     #[arg(long, value_name = "DIR")]
     pub out: Option<PathBuf>,
+    /// Go on with the run that the same command began in this folder; begin it if there is none. `--steps` and `--time` may be
+    /// more than before
+    #[arg(long)]
+    pub resume: bool,
+    /// The time between checkpoints, which are what a run goes on from
+    #[arg(long, value_parser = duration, default_value = "10s", value_name = "TIME")]
+    pub checkpoint: Duration,
     /// Print the summary as JSON
     #[arg(long)]
     pub json: bool,

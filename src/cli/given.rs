@@ -83,6 +83,15 @@ fn entry(path: &str) -> Option<(&str, &str)> {
     path.rsplit_once('#').filter(|(file, id)| !file.is_empty() && !id.is_empty() && !Path::new(path).exists())
 }
 
+/// The file that `[NAME=]FILE[#ID]` names, or that a kind such as a mask means by it.
+pub fn file_of(spec: &str) -> &str {
+    let path = match spec.split_once('=') {
+        Some((name, path)) if is_name(name) => path,
+        _ => spec,
+    };
+    entry(path).map_or(path, |(file, _)| file)
+}
+
 /// One entry of a JSON object, as data of a kind.
 fn part(kind: &str, called: &str, file: &str, id: &str) -> Result<Value, Failure> {
     let all: serde_json::Value =
@@ -98,11 +107,15 @@ fn decode(path: &Path) -> Result<Photo, Failure> {
     photo::decode(&bytes, &Limits::default()).map_err(|e| plain(format!("{}: {e}", path.display())))
 }
 
+/// Whether a text can be the name of a `data` item.
+fn is_name(text: &str) -> bool {
+    !text.is_empty() && text.chars().all(|c| c.is_alphanumeric() || c == '_' || c == '/')
+}
+
 /// The name and path of `NAME=FILE`, or the only item that a plain `FILE` can be for.
 fn named(program: &Program, spec: &str) -> Result<(String, String), Failure> {
     if let Some((name, path)) = spec.split_once('=')
-        && !name.is_empty()
-        && name.chars().all(|c| c.is_alphanumeric() || c == '_' || c == '/')
+        && is_name(name)
     {
         return Ok((name.to_owned(), path.to_owned()));
     }

@@ -5,13 +5,13 @@
 use super::args::Job;
 use super::best::best_draw;
 use super::keypoints::Joints;
-use super::{Failure, given, plain, progress};
+use super::{Failure, files, given, plain, progress};
 use pcadlang::bank::BankFiles;
 use pcadlang::infer::draws::{KernelStats, Sink, SiteStats};
 use pcadlang::infer::{ChainResult, Progress};
 use pcadlang::report::html::{MeshData, Page, page};
 use pcadlang::report::{
-    ChainDraws, Memory, Mode, Quantity, RunDir, Tee, csv::CsvSink, modes, quantities, seconds, table,
+    ChainDraws, ChainFile, Memory, Mode, Quantity, RunDir, bytes_hash, modes, quantities, seconds, table, text_hash,
 };
 use pcadlang::vision::Photo;
 use pcadlang::{Model, RunOptions};
@@ -19,7 +19,10 @@ use serde_json::{Map, Value, json};
 use std::path::Path;
 use std::sync::atomic::{AtomicBool, Ordering};
 use std::sync::{Arc, Mutex, PoisonError, Weak};
-use std::time::Instant;
+use std::time::{Duration, Instant};
+
+/// The numbers that are kept in memory for the summary, all chains together: 32 MiB.
+const ROOM: usize = 4 << 20;
 
 /// A program compiled with what it observes.
 pub struct Ready {
@@ -43,6 +46,8 @@ pub struct Outcome {
     pub warnings: Vec<String>,
     /// The chains.
     pub chains: Vec<ChainResult>,
+    /// The summary is of each so-manieth draw: 1, unless there are more than fit the memory.
+    pub every: u64,
     /// Wall time until everything but the page was written.
     pub seconds: f64,
     /// Whether the user ended it.
@@ -89,9 +94,12 @@ impl Interrupt {
     pub fn listen() -> Arc<Interrupt> {
         let interrupt = Arc::new(Interrupt::default());
         let heard = Arc::clone(&interrupt);
-        // If no handler can be set, the system's own stays.
+        // If no handler can be set, the system's own stays. Whoever asks twice does not want to wait for the step to end; what is
+        // on the disk by then is whole.
         let _ = ctrlc::set_handler(move || {
-            heard.asked.store(true, Ordering::SeqCst);
+            if heard.asked.swap(true, Ordering::SeqCst) {
+                std::process::exit(130);
+            }
             heard.pass_on();
         });
         interrupt
@@ -117,6 +125,20 @@ impl Interrupt {
     }
 }
 
+/// A hash of the files that the command line names, and of those that the program reads by itself.
+///
+/// # Errors
+/// If one is not there any more.
+pub fn inputs_hash(job: &Job, model: &Model) -> Result<String, Failure> {
+    let mut all = model.data_hash().to_owned();
+    let named = job.observe.iter().map(|o| given::file_of(o)).chain(job.keypoints.as_deref().map(given::file_of));
+    let plain = [&job.observe_contours, &job.given.camera].into_iter().flatten();
+    for path in named.map(Path::new).chain(plain.map(|p| p.as_path())) {
+        all.push_str(&bytes_hash(&files::read(path)?));
+    }
+    Ok(text_hash(&all))
+}
+
 /// The folder a program is in.
 fn folder(program: &str) -> &Path {
     Path::new(program).parent().unwrap_or(Path::new(""))
@@ -138,13 +160,14 @@ pub fn machine_threads() -> usize {
 }
 
 /// What `run.json` says of a run before it begins: all that its draws depend on.
-pub fn record(job: &Job, program_hash: &str) -> Map<String, Value> {
+pub fn record(job: &Job, program_hash: &str, inputs: &str) -> Map<String, Value> {
     let s = &job.sampling;
     let record = json!({
         "version": env!("CARGO_PKG_VERSION"),
         "state": "running",
         "program": job.given.program,
         "program_hash": program_hash,
+        "inputs_hash": inputs,
         "seed": s.seed,
         "observe": observed(job).collect::<Vec<_>>(),
         "set": job.given.sets.iter().map(|(k, v)| (k.clone(), json!(v))).collect::<Map<_, _>>(),
@@ -184,17 +207,31 @@ pub fn record_failure(
     write_record(dir, record, "failed", json!({ "error": failure.to_string(), "seconds": seconds }))
 }
 
-/// Runs the chains and fills the folder; `live` shows progress on a terminal. A failure is recorded there too.
+/// The time between checkpoints where nobody says.
+pub const CHECKPOINT: Duration = Duration::from_secs(10);
+
+/// How a run is carried out, which changes nothing of its draws.
+#[derive(Clone, Copy, Debug)]
+pub struct Manner {
+    /// Whether progress is shown, on a terminal.
+    pub live: bool,
+    /// The time between checkpoints.
+    pub checkpoint: Duration,
+    /// Whether it goes on with what the folder has.
+    pub resume: bool,
+}
+
+/// Runs the chains and fills the folder. A failure is recorded there too.
 pub fn perform(
     job: &Job,
     ready: &Ready,
     dir: &RunDir,
     record: &Map<String, Value>,
     interrupt: &Interrupt,
-    live: bool,
+    manner: Manner,
 ) -> Result<Outcome, Failure> {
     write_record(dir, record, "running", json!({}))?;
-    fill(job, ready, dir, record, interrupt, live).inspect_err(|failure| {
+    fill(job, ready, dir, record, interrupt, manner).inspect_err(|failure| {
         // The error that is told is the first one.
         let _ = record_failure(dir, record, failure, ready.begun.elapsed().as_secs_f64());
     })
@@ -206,7 +243,7 @@ fn fill(
     dir: &RunDir,
     record: &Map<String, Value>,
     interrupt: &Interrupt,
-    live: bool,
+    manner: Manner,
 ) -> Result<Outcome, Failure> {
     let Ready { model, photo, begun } = ready;
     let s = &job.sampling;
@@ -223,12 +260,13 @@ fn fill(
         sites: true,
         ..RunOptions::default()
     };
-    let memories: Vec<Memory> = (0..s.chains).map(|_| Memory::default()).collect();
-    let sinks = sinks(dir, job, model, &memories)?;
+    let memories: Vec<Memory> = (0..s.chains).map(|_| Memory::bounded(ROOM / s.chains as usize)).collect();
+    let sinks = sinks(dir, job, model, &memories, record, manner.resume)?;
     let (progress, done) = (Arc::new(Progress::default()), AtomicBool::new(false));
     interrupt.ends(&progress);
     let results = std::thread::scope(|scope| {
-        scope.spawn(|| progress::watch(&progress, &done, options.time, !live));
+        scope.spawn(|| progress::watch(&progress, &done, options.time, !manner.live));
+        scope.spawn(|| progress::ask_for_checkpoints(&progress, &done, manner.checkpoint));
         let results = model.run_into(&options, threads(job), &progress, sinks);
         done.store(true, Ordering::Relaxed);
         results
@@ -239,13 +277,14 @@ fn fill(
     let chains = results.into_iter().collect::<Result<Vec<_>, _>>().map_err(|e| model.chain_error(e))?;
     let draws: Vec<ChainDraws> = memories.iter().map(Memory::draws).collect();
     let quantities = quantities(&draws);
+    let every = draws.iter().map(|d| d.every).max().unwrap_or(1);
     let kernels = table::merged(chains.iter().map(|c| &c.kernels[..]));
     let warnings = table::warnings(&quantities, &kernels, chains.len());
     let modes = modes(&quantities);
     let sites = SiteStats::total(chains.iter().flat_map(|c| &c.sites));
     let summary = json!({
         "quantities": summaries(&quantities, kernel_seconds(&kernels)), "kernels": kernels, "choices": sites,
-        "modes": modes, "warnings": warnings,
+        "modes": modes, "warnings": warnings, "every": every,
     });
     write(dir, "summary.json", &serde_json::to_vec_pretty(&summary).unwrap_or_default())?;
     let drawn = best_draw(dir, s.seed, model, &chains, photo.as_ref())?;
@@ -267,7 +306,7 @@ fn fill(
     let mut more = counts(&chains, &quantities);
     more.extend([("sampling_seconds".into(), json!(sampled)), ("seconds".into(), json!(elapsed))]);
     write_record(dir, record, if interrupted { "interrupted" } else { "done" }, Value::Object(more))?;
-    Ok(Outcome { quantities, kernels, sites, modes, warnings, chains, seconds: elapsed, interrupted })
+    Ok(Outcome { quantities, kernels, sites, modes, warnings, chains, every, seconds: elapsed, interrupted })
 }
 
 /// What `run.json` says of the chains at the end.
@@ -282,8 +321,23 @@ fn counts(chains: &[ChainResult], quantities: &[Quantity]) -> Map<String, Value>
     all.into_iter().map(|(k, v)| (k.to_owned(), v)).collect()
 }
 
-/// One file of draws a chain, and the draws in memory for the summary.
-fn sinks(dir: &RunDir, job: &Job, model: &Model, memories: &[Memory]) -> Result<Vec<Box<dyn Sink>>, Failure> {
+/// What tells a run from others: all that the draws of its chains depend on.
+fn identity(record: &Map<String, Value>) -> String {
+    let said = ["program_hash", "inputs_hash", "seed"].map(|key| record.get(key).cloned().unwrap_or_default());
+    let settings = ["warmup", "incremental"].map(|key| record.get("settings").and_then(|s| s.get(key)).cloned());
+    text_hash(&json!([said, settings]).to_string())
+}
+
+/// The files of each chain, and its draws in memory for the summary.
+fn sinks(
+    dir: &RunDir,
+    job: &Job,
+    model: &Model,
+    memories: &[Memory],
+    record: &Map<String, Value>,
+    resume: bool,
+) -> Result<Vec<Box<dyn Sink>>, Failure> {
+    let run = identity(record);
     let comments = [
         ("program", job.given.program.clone()),
         ("program_hash", model.hash().to_owned()),
@@ -291,9 +345,11 @@ fn sinks(dir: &RunDir, job: &Job, model: &Model, memories: &[Memory]) -> Result<
     ];
     let mut sinks: Vec<Box<dyn Sink>> = Vec::new();
     for (i, memory) in memories.iter().enumerate() {
-        let path = dir.file(&format!("chain-{}.csv", i + 1));
-        let csv = CsvSink::create(&path, i as u32, &comments).map_err(|e| plain(format!("{}: {e}", path.display())))?;
-        sinks.push(Box::new(Tee(vec![Box::new(csv), Box::new(memory.clone())])));
+        let chain = match resume {
+            true => ChainFile::resume(dir, i as u32, &run, &comments, memory),
+            false => ChainFile::begin(dir, i as u32, &run, &comments, memory),
+        };
+        sinks.push(Box::new(chain.map_err(|e| plain(format!("{}: {e}", dir.path().display())))?));
     }
     Ok(sinks)
 }

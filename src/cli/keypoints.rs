@@ -1,13 +1,13 @@
 //! Where the landmarks of a program's view are in the photograph, over all draws: `keypoints.json`.
 
 use super::scene::view_operand;
-use pcadlang::infer::Watch;
+use pcadlang::infer::{StateError, Watch};
 use pcadlang::lang::builtins::scene::ViewValue;
 use pcadlang::lang::code::Operand;
 use pcadlang::report::Moments;
 use pcadlang::trace::{Draws, Trace};
 use serde_json::{Map, Value, json};
-use std::sync::{Arc, Mutex, PoisonError};
+use std::sync::{Arc, Mutex, MutexGuard, PoisonError};
 
 /// The landmarks of the chains, as their draws come. Clones share them.
 #[derive(Clone, Debug)]
@@ -28,6 +28,10 @@ impl Joints {
     /// For so many chains, over a photograph of this size.
     pub fn new(chains: u32, size: Option<(u32, u32)>) -> Joints {
         Joints { size, chains: (0..chains).map(|_| Mutex::default()).collect() }
+    }
+
+    fn chain(&self, chain: u32) -> Option<MutexGuard<'_, Chain>> {
+        Some(self.chains.get(chain as usize)?.lock().unwrap_or_else(PoisonError::into_inner))
     }
 
     /// The width and height of the picture that positions are in.
@@ -66,9 +70,19 @@ fn rounded(x: f64) -> Value {
 }
 
 impl Watch for Joints {
+    fn save(&self, chain: u32) -> Vec<u8> {
+        self.chain(chain).and_then(|c| serde_json::to_vec(&c.moments).ok()).unwrap_or_default()
+    }
+
+    fn load(&self, chain: u32, state: &[u8]) -> Result<(), StateError> {
+        if let Some(mut chain) = self.chain(chain) {
+            chain.moments = serde_json::from_slice(state).map_err(|e| StateError(e.to_string()))?;
+        }
+        Ok(())
+    }
+
     fn draw(&self, chain: u32, trace: &mut Trace, draws: Draws) {
-        let Some(chain) = self.chains.get(chain as usize) else { return };
-        let mut chain = chain.lock().unwrap_or_else(PoisonError::into_inner);
+        let Some(mut chain) = self.chain(chain) else { return };
         let Some(at) = *chain.view.get_or_insert_with(|| view_operand(trace, draws)) else { return };
         let Ok(values) = trace.query(&[at], draws) else { return };
         let Some(view) = values.first().and_then(|v| v.downcast::<ViewValue>()) else { return };

@@ -6,6 +6,7 @@ mod calibrate;
 mod check;
 mod contours;
 mod doc;
+mod earlier;
 mod evaluate;
 mod files;
 mod given;

@@ -37,6 +37,18 @@ pub fn watch(progress: &Progress, done: &AtomicBool, limit: Option<Duration>, qu
     bar.finish_and_clear();
 }
 
+/// Has the chains hand over checkpoints at even distances of time, until `done`.
+pub fn ask_for_checkpoints(progress: &Progress, done: &AtomicBool, every: Duration) {
+    let mut last = Instant::now();
+    while !done.load(Ordering::Relaxed) {
+        std::thread::sleep(PAUSE.min(every));
+        if last.elapsed() >= every {
+            last = Instant::now();
+            progress.checkpoints.fetch_add(1, Ordering::Relaxed);
+        }
+    }
+}
+
 /// Shows how many of so many things are done, until `over`.
 pub fn count(done: &AtomicU64, of: u64, over: &AtomicBool, quiet: bool) {
     if quiet || !term::is_live() {

@@ -1,8 +1,8 @@
 //! `pcadlang run`: one run, its folder, and what is said of it at the end.
 
 use super::args::Run;
-use super::job::{self, Interrupt, Outcome};
-use super::{Failure, plain};
+use super::job::{self, Interrupt, Manner, Outcome};
+use super::{Failure, earlier, plain};
 use pcadlang::report::{RunDir, modes_table, seconds, table};
 use serde_json::json;
 use std::path::Path;
@@ -14,14 +14,17 @@ pub fn run(a: &Run) -> Result<(), Failure> {
     if let (Some(text), false) = (&default_plan, a.quiet) {
         eprintln!("note: the program has no `infer` block; this plan is used, copy and edit it:\n{text}");
     }
-    let dir = match &a.out {
-        Some(path) => RunDir::create(path),
-        None => RunDir::fresh(Path::new("runs"), job::stem(&a.job.given.program)),
-    };
-    let dir = dir.map_err(|e| plain(e.to_string()))?;
     let interrupt = Interrupt::listen();
-    let record = job::record(&a.job, ready.model.hash());
-    let outcome = job::perform(&a.job, &ready, &dir, &record, &interrupt, !(a.quiet || a.json))?;
+    let record = job::record(&a.job, ready.model.hash(), &job::inputs_hash(&a.job, &ready.model)?);
+    let (runs, name) = (Path::new("runs"), job::stem(&a.job.given.program));
+    let dir = match &a.out {
+        Some(path) if a.resume => earlier::resumed(path, &record)?,
+        None if a.resume => earlier::resumed(&RunDir::latest(runs, name), &record)?,
+        Some(path) => RunDir::create(path).map_err(|e| plain(e.to_string()))?,
+        None => RunDir::fresh(runs, name).map_err(|e| plain(e.to_string()))?,
+    };
+    let manner = Manner { live: !(a.quiet || a.json), checkpoint: a.checkpoint, resume: a.resume };
+    let outcome = job::perform(&a.job, &ready, &dir, &record, &interrupt, manner)?;
     show(a, &dir, &outcome);
     if outcome.interrupted { Err(Failure::Interrupted) } else { Ok(()) }
 }
@@ -60,6 +63,9 @@ fn show(a: &Run, dir: &RunDir, o: &Outcome) {
             "note: a likelihood is no density over its data, so intervals depend on its scale (a pseudo-posterior)"
         );
     }
+    if o.every > 1 {
+        println!("note: the summary is of one draw in {}; the files of the chains have all", o.every);
+    }
     let steps: u64 = o.chains.iter().map(|c| c.steps + c.warmup).sum();
     let most = o.chains.iter().map(|c| (c.steps, c.warmup)).max().unwrap_or_default();
     println!("seed {seed}, {} chains, {steps} steps in {}", o.chains.len(), seconds(o.seconds));
@@ -67,7 +73,16 @@ fn show(a: &Run, dir: &RunDir, o: &Outcome) {
         println!("the longest chain again: --steps {} --warmup {}", most.0, most.1);
     }
     if o.interrupted {
-        println!("interrupted: every draw so far is kept");
+        println!(
+            "interrupted: every draw so far is kept; to go on, the same command with --resume --out {}",
+            shown(dir)
+        );
     }
     println!("{}", dir.path().display());
+}
+
+/// A folder as it is written on a command line.
+fn shown(dir: &RunDir) -> String {
+    let path = dir.path().display().to_string();
+    if path.contains(char::is_whitespace) { format!("'{path}'") } else { path }
 }

@@ -4,10 +4,11 @@
 //! ran.
 
 use indexmap::IndexMap;
+use serde::{Deserialize, Serialize};
 use std::sync::Arc;
 
 /// One point's draws so far.
-#[derive(Clone, Copy, Debug, Default, PartialEq)]
+#[derive(Clone, Copy, Debug, Default, PartialEq, Serialize, Deserialize)]
 pub struct Point {
     /// The number of draws.
     pub count: u64,
@@ -40,7 +41,7 @@ impl Point {
 }
 
 /// Points by name, in order of first appearance. A point need not be in every draw.
-#[derive(Clone, Debug, Default)]
+#[derive(Clone, Debug, Default, Serialize, Deserialize)]
 pub struct Moments(IndexMap<Arc<str>, Point>);
 
 impl Moments {

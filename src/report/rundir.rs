@@ -36,6 +36,9 @@ pub enum RunDirError {
     /// It holds something, and no evaluation.
     #[error("{0} is not empty and no folder of an evaluation; choose another with --out")]
     NoEvaluation(PathBuf),
+    /// It holds no run.
+    #[error("{0} holds no run")]
+    NoRun(PathBuf),
     /// It cannot be made or written.
     #[error("{path}: {error}")]
     Io {
@@ -83,9 +86,26 @@ impl RunDir {
     /// # Errors
     /// If it cannot be made.
     pub fn fresh(parent: &Path, name: &str) -> Result<RunDir, RunDirError> {
-        let candidate = |n: u32| parent.join(if n == 1 { name.to_owned() } else { format!("{name}-{n}") });
-        let free = (1..10_000).map(candidate).find(|p| !p.exists()).unwrap_or_else(|| candidate(10_000));
+        let free = (1..MOST).map(|n| numbered(parent, name, n)).find(|p| !p.exists());
+        let free = free.unwrap_or_else(|| numbered(parent, name, MOST));
         RunDir::create(&free)
+    }
+
+    /// A folder that holds a run, with all that is in it.
+    ///
+    /// # Errors
+    /// If it holds none.
+    pub fn open(path: &Path) -> Result<RunDir, RunDirError> {
+        match path.join(MARK).is_file() {
+            true => Ok(RunDir { path: path.to_owned() }),
+            false => Err(RunDirError::NoRun(path.to_owned())),
+        }
+    }
+
+    /// The last one that [`RunDir::fresh`] made, or the first that it would make.
+    pub fn latest(parent: &Path, name: &str) -> PathBuf {
+        let made = (1..MOST).map(|n| numbered(parent, name, n)).take_while(|p| p.exists()).last();
+        made.unwrap_or_else(|| numbered(parent, name, 1))
     }
 
     /// Where it is.
@@ -105,6 +125,14 @@ impl RunDir {
     pub fn write(&self, name: &str, bytes: &[u8]) -> Result<(), RunDirError> {
         write_whole(&self.path, name, bytes).map_err(|error| RunDirError::Io { path: self.file(name), error })
     }
+}
+
+/// The most folders of runs with one name.
+const MOST: u32 = 10_000;
+
+/// `name`, `name-2`, `name-3`, ….
+fn numbered(parent: &Path, name: &str, n: u32) -> PathBuf {
+    parent.join(if n == 1 { name.to_owned() } else { format!("{name}-{n}") })
 }
 
 /// Whether a file holds the draws of a chain, or its checkpoint: `chain-N.csv`, `chain-N.checkpoint`.

@@ -5,10 +5,10 @@
 
 mod dataset;
 mod observed;
-mod resume;
 
 use super::args::{Evaluate, Given, Job};
-use super::job::Interrupt;
+use super::earlier;
+use super::job::{CHECKPOINT, Interrupt, Manner};
 use super::{Failure, given, job, plain, term};
 use dataset::{Case, Dataset, Layout};
 use observed::{Detections, Items, observations_for};
@@ -120,9 +120,8 @@ impl<'a> Evaluation<'a> {
                 features_from: None,
                 sampling: a.sampling.clone(),
             };
-            let mut record = job::record(&job, &hash);
             let inputs = bytes_hash(&observed::bytes(&case, detections.as_ref()));
-            record.insert("inputs_hash".into(), json!(inputs));
+            let record = job::record(&job, &hash, &inputs);
             let chosen = a.only.is_empty() || a.only.contains(&case.name);
             Task { case, job, record, chosen, row: None }
         };
@@ -145,8 +144,8 @@ impl<'a> Evaluation<'a> {
         for t in &mut self.tasks {
             t.row = t.chosen.then(|| Row::pending(&t.case.name));
             let folder = self.dir.file(&t.case.name);
-            let Some(run) = resume::left(&folder) else { continue };
-            let differences = resume::differences(&run, &t.record);
+            let Some(run) = earlier::left(&folder) else { continue };
+            let differences = earlier::differences(&run, &t.record);
             if differences.is_empty() && !(self.a.fresh && t.chosen) {
                 t.row = Some(Row::of(&t.case.name, &run));
             } else if !differences.is_empty() && run["state"] != "failed" {
@@ -188,7 +187,7 @@ impl<'a> Evaluation<'a> {
         let begun = Instant::now();
         match self.fill(t) {
             Ok(()) => {
-                let run = resume::left(&self.dir.file(&t.case.name)).unwrap_or_default();
+                let run = earlier::left(&self.dir.file(&t.case.name)).unwrap_or_default();
                 (Row::of(&t.case.name, &run), None)
             }
             // Its folder may be what failed.
@@ -212,7 +211,8 @@ impl<'a> Evaluation<'a> {
             let _ = job::record_failure(&dir, &t.record, failure, begun.elapsed().as_secs_f64());
         })?;
         let live = !(self.a.quiet || self.a.json);
-        job::perform(&t.job, &ready, &dir, &t.record, &self.interrupt, live).map(|_| ())
+        let manner = Manner { live, checkpoint: CHECKPOINT, resume: false };
+        job::perform(&t.job, &ready, &dir, &t.record, &self.interrupt, manner).map(|_| ())
     }
 
     fn rows(&self) -> Vec<Row> {

@@ -1,5 +1,7 @@
-//! Whether what an earlier evaluation left is of the same settings.
+//! What an earlier run left in a folder, and whether it is of the same settings.
 
+use super::{Failure, plain};
+use pcadlang::report::RunDir;
 use serde_json::{Map, Value};
 use std::path::Path;
 
@@ -38,6 +40,27 @@ pub fn differences(there: &Value, record: &Map<String, Value>) -> Vec<String> {
         }
     }
     all
+}
+
+/// The folder of a run to go on with: that of the same command, or a new one where there is none yet. How long it runs may be
+/// another than before.
+///
+/// # Errors
+/// If a run with other settings was begun there, or the folder cannot be used.
+pub fn resumed(folder: &Path, record: &Map<String, Value>) -> Result<RunDir, Failure> {
+    let Some(there) = left(folder) else { return RunDir::create(folder).map_err(|e| plain(e.to_string())) };
+    let mut now = record.clone();
+    if let Some(Value::Object(settings)) = now.get_mut("settings") {
+        settings.remove("steps");
+        settings.remove("time");
+    }
+    match &differences(&there, &now)[..] {
+        [] => RunDir::open(folder).map_err(|e| plain(e.to_string())),
+        different => Err(Failure::Plain(
+            format!("the run in {} cannot go on: it is of another {}", folder.display(), different.join(", ")),
+            Some("repeat the command it was begun with, or choose another folder with --out".into()),
+        )),
+    }
 }
 
 fn said(what: &str, there: &Value, now: &Value) -> String {
