@@ -383,7 +383,11 @@ impl Model {
                 if zero.terms.len() > 5 {
                     d = d.note(format!("and {} more", zero.terms.len() - 5));
                 }
-                d.hint("widen the prior, or the spread of the observation")
+                if !zero.drawn.is_empty() {
+                    let drawn: Vec<String> = zero.drawn.iter().map(|(a, v)| format!("{a} = {v}")).collect();
+                    d = d.note(format!("in the last of them {}", drawn.join(", ")));
+                }
+                d.hint("widen the prior or the spread of what is observed; a factor of -inf rules a state out")
             }
             ChainError::Sink(e) => plain(format!("draws cannot be written: {e}")),
             ChainError::Checkpoint(e) => plain(format!("a chain cannot go on: {e}")),

@@ -83,3 +83,45 @@ phase!(parse_errors, "parse/*.pcad", parsing);
 phase!(name_errors, "name/*.pcad", compiling);
 phase!(type_errors, "type/*.pcad", compiling);
 phase!(runtime_errors, "runtime/*.pcad", running);
+
+const PHASES: [(&str, &str, Diagnose); 4] = [
+    ("parse", "What does not read as a program", parsing),
+    ("name", "Names, arguments, and what stands where it cannot", compiling),
+    ("type", "Values of the wrong type", compiling),
+    ("runtime", "What shows only in a run", running),
+];
+
+/// `REGENERATE=1 cargo test --test errors` rewrites the catalogue.
+#[test]
+fn the_catalogue_is_up_to_date() {
+    let root = Path::new(env!("CARGO_MANIFEST_DIR"));
+    let mut text = String::from(
+        "# Mistakes and what is said of them\n\nEach program of `programs/errors` has one kind of mistake. Below it is what `pcadlang` says; \
+         the tests keep it so. `REGENERATE=1 cargo test --test errors` writes this page.\n",
+    );
+    for (phase, title, diagnose) in PHASES {
+        text += &format!("\n## {title}\n");
+        let mut programs: Vec<_> = std::fs::read_dir(root.join("programs/errors").join(phase))
+            .unwrap()
+            .map(|f| f.unwrap().path())
+            .filter(|p| p.extension().is_some_and(|e| e == "pcad"))
+            .collect();
+        programs.sort();
+        for path in programs {
+            let name = path.file_stem().unwrap().to_string_lossy().replace('_', " ");
+            let program = std::fs::read_to_string(&path).unwrap();
+            let said = message(&path, diagnose);
+            let lines = |s: &str| {
+                s.trim_end().lines().map(|l| format!("    {l}").trim_end().to_owned() + "\n").collect::<String>()
+            };
+            text += &format!("\n### {name}\n\n{}\n```text\n{}\n```\n", lines(&program), said.trim_end());
+        }
+    }
+    let path = root.join("docs/mistakes.md");
+    if std::env::var_os("REGENERATE").is_some() {
+        std::fs::write(path, &text).unwrap();
+        return;
+    }
+    let there = std::fs::read_to_string(path).unwrap();
+    assert!(there == text, "docs/mistakes.md is out of date: REGENERATE=1 cargo test --test errors");
+}

@@ -29,7 +29,8 @@ pub(crate) fn apply(
             let known: Vec<String> = trace.choices().iter().map(|(a, _, _)| a.to_string()).collect();
             let mut e = fail(f.span, format!("there is no choice {address} among those the observations ask for"));
             let near = crate::diag::nearest(&address.to_string(), known.iter().map(String::as_str));
-            e.hint = near.map(|n| format!("did you mean {n}?"));
+            let all = || format!("there are {}", known[..known.len().min(8)].join(", "));
+            e.hint = Some(near.map_or_else(all, |n| format!("did you mean {n}?")));
             return Err(e);
         };
         let dist = trace.dist(target);

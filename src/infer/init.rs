@@ -47,6 +47,8 @@ pub enum StartError {
 pub struct NoStart {
     /// Observations and factors first, then choices.
     pub terms: Vec<ZeroTerm>,
+    /// The first choices of that draw that are single numbers or truth values, with their values.
+    pub drawn: Vec<(Address, Value)>,
 }
 
 /// A term of the joint density whose logarithm is -∞.
@@ -117,7 +119,11 @@ pub fn starts(code: &Arc<Code>, seed: u64, chain: u32, how: Start, limits: Limit
 /// Which terms of a trace have no probability.
 fn explain(t: &Trace) -> NoStart {
     let zero = t.impossible().into_iter().map(|(address, span)| ZeroTerm { address, span });
-    NoStart { terms: zero.collect() }
+    let single = |(address, value, _): (Address, Value, _)| match value {
+        Value::Num(_) | Value::Bool(_) => Some((address, value)),
+        _ => None,
+    };
+    NoStart { terms: zero.collect(), drawn: t.choices().into_iter().filter_map(single).take(6).collect() }
 }
 
 /// What the `init` statement of a plan asks for.

@@ -43,7 +43,8 @@ fn position(base: &Value, x: f64) -> Result<Value, Fault> {
         return base.element(i).map_or_else(|| fail("no such element".into()), Ok);
     }
     if x != libm::trunc(x) {
-        return fail(format!("an array is indexed by a whole number, got {x}"));
+        let message = format!("an array is indexed by a whole number, got {x}");
+        return Err(Fault::new(FaultKind::Index, message).with_hint("floor(x) and round(x) give one"));
     }
     let range = match len {
         0 => "it is empty".to_owned(),

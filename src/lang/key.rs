@@ -1,5 +1,6 @@
 //! Keys: what tells the elements of containers, the passes of loops and the entries of `mem` apart.
 
+use super::error::Fault;
 use super::value::Value;
 use serde::{Deserialize, Serialize};
 use std::fmt;
@@ -22,6 +23,15 @@ impl Key {
     /// A number's key; `None` for NaN.
     pub fn num(x: f64) -> Option<Key> {
         if x.is_nan() { None } else { Some(Key::Num((x + 0.0).to_bits())) }
+    }
+
+    /// The key that a value is.
+    ///
+    /// # Errors
+    /// If it is none.
+    pub fn of(v: &Value) -> Result<Key, Fault> {
+        let other = || Fault::type_error(format!("a key must be a number, a string or a bool, got {}", v.type_name()));
+        Key::from_value(v).ok_or_else(other)
     }
 
     /// The key a value stands for; `None` if it cannot be one (a function, an object, NaN).

@@ -181,7 +181,12 @@ pub(super) fn notes(name: &str) -> Vec<(&'static str, String)> {
 }
 
 fn fault(e: ParamError) -> Fault {
-    Fault::domain(e.to_string())
+    let fault = Fault::domain(e.to_string());
+    match e.rule.starts_with("must be positive") {
+        true => fault
+            .with_hint("what must be positive is drawn from half_normal, gamma or lognormal, or is exp of a number"),
+        false => fault,
+    }
 }
 
 /// A distribution of a number, or a product of such when a parameter is an array. Parameters left out have the defaults.

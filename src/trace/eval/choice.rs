@@ -137,7 +137,9 @@ impl Graph {
     fn own_keyed(&self, code: &Code, n: NodeId, frame: FrameId, site: u32, keys: &[Operand]) -> Result<u64, Failure> {
         let own = self.own_keys(code, frame, keys);
         if own.len() < keys.len() {
-            return Err(self.type_error(code, n, "a key must be a number, a string or a bool".into()));
+            keys.iter()
+                .try_for_each(|k| Key::of(self.value(code, frame, *k)).map(drop))
+                .map_err(|f| self.fault(code, n, f))?;
         }
         Ok(self.own_keyed_hash(code, frame, site, &own))
     }

@@ -113,12 +113,11 @@ impl Graph {
                         return self.need(code, m).map(Some);
                     }
                     deps.extend(self.resolve(frame, *o));
-                    Key::from_value(self.value(code, frame, *o))
+                    let value = self.value(code, frame, *o);
+                    Some(Key::of(value).map_err(|f| self.fault(code, n, f))?)
                 }
             };
-            let Some(key) = key else {
-                return Err(self.type_error(code, n, "a key must be a number, a string or a bool".into()));
-            };
+            let Some(key) = key else { return Ok(None) };
             keys.push(key);
         }
         let element = Element { source: index, passes: passes.clone() };
@@ -126,7 +125,8 @@ impl Graph {
             let shown = keys.iter().map(|k| format!("[{k}]")).collect::<String>();
             let Op::Container { name, .. } = self.op(code, n) else { return Ok(None) };
             let message = format!("`{name}{shown}` is drawn twice");
-            return Err(self.fail(code, n, FaultKind::Duplicate, message, None));
+            let hint = "every pass of the loop needs a key of its own".to_owned();
+            return Err(self.fail(code, n, FaultKind::Duplicate, message, Some(hint)));
         }
         Ok(None)
     }
