@@ -1,0 +1,129 @@
+//! A newcomer goes through the guide: every file of its chapters is written, every command typed, in the order of the text and in
+//! one folder that holds nothing else but the lamp's picture. What the commands say must be what the guide shows.
+//!
+//! In the guide, `title=NAME` after a block's language names the file it is; a `diff` block is an edit of the file `from`. Below a command is what it says:
+//! `...` stands for any lines, `[..]` for any text within one, `? N` for the exit code N.
+#![cfg(unix)]
+
+#[path = "common/folder.rs"]
+mod folder;
+
+use folder::Folder;
+use std::path::{Path, PathBuf};
+use std::process::Command;
+
+/// A block of a page: what stands after the fence, and the text.
+struct Block<'a> {
+    info: &'a str,
+    text: String,
+    line: usize,
+}
+
+impl Block<'_> {
+    fn option(&self, key: &str) -> Option<&str> {
+        self.info.split(' ').find_map(|word| word.strip_prefix(key)?.strip_prefix('='))
+    }
+}
+
+fn blocks(page: &str) -> Vec<Block<'_>> {
+    let (mut all, mut open): (Vec<Block>, bool) = (Vec::new(), false);
+    for (i, line) in page.lines().enumerate() {
+        match line.strip_prefix("```") {
+            Some(info) if !open => all.push(Block { info, text: String::new(), line: i + 1 }),
+            None if open => all.last_mut().unwrap().text += &format!("{line}\n"),
+            _ => {}
+        }
+        open ^= line.starts_with("```");
+    }
+    all
+}
+
+/// Whether lines are what is shown.
+fn agree(shown: &[&str], said: &[&str]) -> bool {
+    match shown.split_first() {
+        None => said.is_empty(),
+        Some((&"...", rest)) => (0..=said.len()).any(|skip| agree(rest, &said[skip..])),
+        Some((line, rest)) => said.split_first().is_some_and(|(s, more)| fits(line, s.trim_end()) && agree(rest, more)),
+    }
+}
+
+/// Whether a line is what is shown, with gaps.
+fn fits(shown: &str, said: &str) -> bool {
+    let Some((head, tail)) = shown.split_once("[..]") else { return shown == said };
+    let Some(rest) = said.strip_prefix(head) else { return false };
+    let ends = rest.char_indices().map(|(i, _)| i).chain([rest.len()]);
+    ends.into_iter().any(|i| fits(tail, &rest[i..]))
+}
+
+#[test]
+fn gaps_fit() {
+    assert!(agree(&["a", "...", "b[..]d"], &["a", "x", "y", "b c d"]) && agree(&["..."], &[]));
+    assert!(!agree(&["a", "...", "b"], &["a", "b", "c"]) && !fits("a[..]b", "a b c"));
+}
+
+/// Types the commands of a block.
+fn type_in(block: &Block, folder: &Path, place: &str) {
+    let path = format!("{}:{}", folder.join("bin").display(), std::env::var("PATH").unwrap_or_default());
+    let typed = format!("\n{}", block.text);
+    for session in typed.split("\n$ ").skip(1) {
+        let mut lines: Vec<&str> = session.trim_end().lines().collect();
+        let command = lines.remove(0);
+        let code = lines.pop_if(|l| l.starts_with("? ")).map_or(0, |l| l[2..].parse().unwrap());
+        let done = Command::new("sh")
+            .args(["-c", &format!("{{ {command}\n}} 2>&1")])
+            .current_dir(folder)
+            .env("PATH", &path)
+            .output()
+            .unwrap();
+        let said = String::from_utf8(done.stdout).unwrap();
+        let right = agree(&lines, &said.trim_end().lines().collect::<Vec<_>>());
+        assert!(right, "{place}: `{command}` says\n{said}\nthe guide shows\n{}", lines.join("\n"));
+        assert_eq!(done.status.code(), Some(code), "{place}: `{command}`\n{said}");
+    }
+}
+
+/// Makes an edit: lines with `-` go, lines with `+` come, the others say where.
+fn edit(text: &str, diff: &str, place: &str) -> String {
+    let mut text = text.to_owned();
+    for hunk in diff.split("@@\n").skip(1) {
+        let lines = |sign: char| -> String {
+            hunk.lines().filter(|l| l.starts_with([' ', sign])).map(|l| format!("{}\n", &l[1..])).collect()
+        };
+        let (old, new) = (lines('-'), lines('+'));
+        assert_eq!(text.matches(&old).count(), 1, "{place}: the file has not this once:\n{old}");
+        text = text.replace(&old, &new);
+    }
+    text
+}
+
+#[test]
+fn every_chapter() {
+    let root = Path::new(env!("CARGO_MANIFEST_DIR"));
+    let folder = Folder::new("guide");
+    let at = folder.path();
+    std::fs::create_dir(at.join("bin")).unwrap();
+    std::os::unix::fs::symlink(env!("CARGO_BIN_EXE_pcadlang"), at.join("bin/pcadlang")).unwrap();
+    std::fs::copy(root.join("examples/images/table_lamp.png"), at.join("table_lamp.png")).unwrap();
+    let pages = std::fs::read_dir(root.join("docs/guide")).unwrap().map(|f| f.unwrap().path());
+    let mut chapters: Vec<PathBuf> = pages.filter(|p| p.file_name().unwrap() != "README.md").collect();
+    chapters.sort();
+    assert_eq!(chapters.len(), 10);
+    for chapter in chapters {
+        let page = std::fs::read_to_string(&chapter).unwrap();
+        let name = chapter.file_name().unwrap().to_string_lossy();
+        for block in blocks(&page) {
+            let place = format!("docs/guide/{name}:{}", block.line);
+            let language = block.info.split(' ').next().unwrap_or_default();
+            match (language, block.option("title")) {
+                ("console", _) => type_in(&block, at, &place),
+                ("diff", Some(title)) => {
+                    let from = std::fs::read_to_string(at.join(block.option("from").unwrap())).unwrap();
+                    std::fs::write(at.join(title), edit(&from, &block.text, &place)).unwrap();
+                }
+                (_, Some(title)) => std::fs::write(at.join(title), &block.text).unwrap(),
+                // Every snippet is tested.
+                _ => panic!("{place}: a block that is neither a file nor a session"),
+            }
+        }
+    }
+}
