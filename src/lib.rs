@@ -14,6 +14,7 @@ pub mod infer;
 pub mod lang;
 mod model;
 pub mod num;
+mod platform;
 pub mod render;
 pub mod report;
 pub mod rng;

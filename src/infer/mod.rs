@@ -12,7 +12,6 @@ mod init;
 mod kernel;
 mod kernels;
 mod neighbours;
-mod parallel;
 mod plain;
 mod plan;
 mod population;
@@ -23,6 +22,8 @@ mod selection;
 mod sites;
 mod state;
 
+use crate::platform::threads as parallel;
+pub(crate) use crate::platform::threads::in_parallel;
 pub use chains::run_chains;
 pub use default_plan::default_plan;
 pub(crate) use init::attempts;
@@ -33,6 +34,5 @@ pub use kernels::{
     Slice, Smc, Temper,
 };
 pub use neighbours::{Banks, Latent, Latents, Neighbours};
-pub(crate) use parallel::in_parallel;
 pub use plan::{ChainError, ChainResult, Checkpoint, Progress, RunOptions, Watch, run_from};
 pub use state::StateError;

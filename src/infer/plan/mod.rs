@@ -16,13 +16,14 @@ use super::population::Population;
 use super::state::StateError;
 use crate::lang::code::Code;
 use crate::lang::error::RunError;
+use crate::platform::clock::Instant;
 use crate::syntax::ast::{Expr, ExprKind, KStmt};
 use crate::trace::{Constraint, Draws, Limits, Trace};
 use runner::Runner;
 use std::fmt;
 use std::sync::Arc;
 use std::sync::atomic::{AtomicBool, AtomicU64};
-use std::time::{Duration, Instant};
+use std::time::Duration;
 
 /// Bounds and settings of a run.
 #[derive(Clone, Debug)]
