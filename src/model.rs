@@ -87,7 +87,7 @@ pub struct Program {
     text: String,
     sets: Vec<(String, String)>,
     data: IndexMap<String, Value>,
-    defaults: FxHashMap<(&'static str, &'static str), Value>,
+    defaults: FxHashMap<(String, String), Value>,
     needs_data: bool,
     builtins: Arc<Table>,
 }
@@ -188,8 +188,8 @@ impl Program {
 
     /// The value of an argument wherever a program leaves it out: of a built-in by full name, an argument by name.
     #[must_use]
-    pub fn default_argument(mut self, function: &'static str, argument: &'static str, value: Value) -> Program {
-        self.defaults.insert((function, argument), value);
+    pub fn default_argument(mut self, function: &str, argument: &str, value: Value) -> Program {
+        self.defaults.insert((function.into(), argument.into()), value);
         self
     }
 
@@ -222,13 +222,14 @@ impl Program {
                 }
             }
         }
-        if self.defaults.contains_key(&RENDER) {
+        let render = (RENDER.0.to_owned(), RENDER.1.to_owned());
+        if self.defaults.contains_key(&render) {
             return;
         }
         let keypoints = || self.data.values().find_map(|v| v.downcast::<KeypointsValue>().and_then(|k| k.0.size()));
         if let Some((width, height)) = picture.or_else(keypoints) {
             let camera = CameraValue(Camera::default_for(width, height));
-            self.defaults.insert(RENDER, Value::object(camera));
+            self.defaults.insert(render, Value::object(camera));
         }
     }
 

@@ -19,7 +19,7 @@ pub struct Gradient {
 /// its values follow when its parameters move. By default the stored form is the value itself.
 pub trait Distribution: fmt::Debug + Send + Sync {
     /// The name in the language.
-    fn name(&self) -> &'static str;
+    fn name(&self) -> &str;
 
     /// The space of its values.
     fn support(&self) -> Support;
@@ -46,6 +46,13 @@ pub trait Distribution: fmt::Debug + Send + Sync {
     /// The value made from white noise: standard normal noise gives draws.
     fn colour(&self, _z: &[f64]) -> Option<Datum> {
         None
+    }
+
+    /// Whether its bounds are parameters, so that the support moves with them. Bounds that are the same for all parameters may say
+    /// so here: gradients by the parameters of one that moves are not known.
+    fn has_moving_support(&self) -> bool {
+        use Support::*;
+        matches!(self.support(), AtLeast { .. } | AtMost { .. } | Interval { .. } | Ascending(..))
     }
 
     /// Whether values are single numbers.

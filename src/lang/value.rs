@@ -112,7 +112,7 @@ pub struct Located {
 /// and kept with the value.
 pub trait Likelihood: fmt::Debug + Send + Sync {
     /// What errors call it.
-    fn name(&self) -> &'static str;
+    fn name(&self) -> &str;
     /// The log density; never NaN.
     ///
     /// # Errors

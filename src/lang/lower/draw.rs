@@ -24,7 +24,7 @@ impl Lowerer<'_> {
     /// What a family draws, where it can be told.
     fn drawn_type(&self, d: &DistSpec) -> Type {
         match d {
-            DistSpec::Family { builtin, args } => match self.code.builtins.get(*builtin).name {
+            DistSpec::Family { builtin, args } => match &*self.code.builtins.get(*builtin).name {
                 "flip" => Type::Any,
                 "dirichlet" | "mv_normal" | "gp" | "multinomial" | "lkj" | "wishart" | "ordered" => Type::Array,
                 "iid" | "mixture" => Type::Any,
