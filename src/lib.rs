@@ -10,6 +10,7 @@ pub mod bank;
 pub mod diag;
 pub mod dist;
 pub mod geom;
+pub mod host;
 pub mod infer;
 pub mod lang;
 mod model;
@@ -23,4 +24,5 @@ pub mod trace;
 pub mod vision;
 
 pub use infer::RunOptions;
+pub use lang::value::Value;
 pub use model::{Error, Model, Posterior, Program};

@@ -10,6 +10,7 @@
 //! ```
 
 use crate::diag::{Diagnostic, IntoDiagnostic, Severity, SourceMap, render};
+use crate::host::Host;
 use crate::infer::draws::Sink;
 use crate::infer::{ChainError, ChainResult, Progress, RunOptions, default_plan, run_chains};
 use crate::lang::builtins::data::Options;
@@ -20,6 +21,7 @@ use crate::lang::error::{Fault, FaultKind, RunError};
 use crate::lang::load::{Disk, Loaded, Loader, Nowhere, load, load_text, read, reason};
 use crate::lang::lower::{Compiled, Export, Inputs, Interface, Report, compile, inspect};
 use crate::lang::value::Value;
+use crate::platform::clock;
 use crate::render::Camera;
 use crate::report::{ChainDraws, Memory, Quantity, bytes_hash, quantities, text_hash};
 use crate::rng::{Purpose, StreamKey};
@@ -191,6 +193,15 @@ impl Program {
     pub fn default_argument(mut self, function: &str, argument: &str, value: Value) -> Program {
         self.defaults.insert((function.into(), argument.into()), value);
         self
+    }
+
+    /// What the program calls may be the host's too.
+    ///
+    /// # Errors
+    /// If the host brings a name of the language without saying that it replaces it, or something is wrong with what it brings.
+    pub fn host(mut self, host: &Host) -> Result<Program, Error> {
+        self.builtins = host.table()?;
+        Ok(self)
     }
 
     /// Compiles also when `data` items are not given, to check the rest.
@@ -440,6 +451,10 @@ impl Model {
         progress: &Progress,
         sinks: Vec<Box<dyn Sink>>,
     ) -> Result<Vec<Result<ChainResult, ChainError>>, Error> {
+        if options.time.is_some() && !clock::RUNS {
+            let d = Diagnostic::new(Severity::Error, "there is no clock on this platform, so a run cannot end by time");
+            return Err(Error { diagnostics: vec![d.hint("bound it by `steps`")], sources: self.sources.clone() });
+        }
         let (plan, _) = self.plan()?;
         Ok(run_chains(self.code(), &plan, options, threads, progress, sinks))
     }

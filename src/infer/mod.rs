@@ -8,6 +8,7 @@ pub mod diagnostics;
 pub mod draws;
 mod expr;
 mod force;
+mod foreign;
 mod init;
 mod kernel;
 mod kernels;
@@ -26,9 +27,11 @@ use crate::platform::threads as parallel;
 pub(crate) use crate::platform::threads::in_parallel;
 pub use chains::run_chains;
 pub use default_plan::default_plan;
+pub use foreign::KernelCall;
+pub(crate) use foreign::KernelMaker;
 pub(crate) use init::attempts;
 pub use init::{Start, StartError, starts};
-pub use kernel::{At, Kernel, Outcome, Pick, Scope};
+pub use kernel::{At, Kernel, Outcome, Pick, Scope, decide, recoverable};
 pub use kernels::{
     Abc, AbcSmc, Block, Delayed, Drift, Elliptical, Gibbs, Hamiltonian, Hmc, Independent, Knn, Mh, Nuts, Optimize,
     Slice, Smc, Temper,

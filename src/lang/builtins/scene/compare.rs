@@ -157,12 +157,12 @@ pub(super) fn by_view(by: Adjoint, others: usize) -> Pulled {
 }
 
 /// By the view, from derivatives by the pieces of its contours.
-fn by_contours(view: &View, size: u32, by_piece: &[[f64; 4]]) -> Adjoint {
+pub(crate) fn by_contours(view: &View, size: u32, by_piece: &[[f64; 4]]) -> Adjoint {
     BySolid { landmarks: Vec::new(), vertices: view.pull_contours(size, by_piece) }.into_adjoint()
 }
 
 /// By the view, from what each pixel brings that the object covers.
-pub(super) fn by_silhouette(view: &View, size: u32, gains: &[f64]) -> Adjoint {
+pub(crate) fn by_silhouette(view: &View, size: u32, gains: &[f64]) -> Adjoint {
     BySolid { landmarks: Vec::new(), vertices: view.pull_mask(size, gains) }.into_adjoint()
 }
 

@@ -15,6 +15,7 @@ mod seeing;
 mod shape_pulls;
 mod shapes;
 
+pub(crate) use compare::{by_contours, by_silhouette};
 pub use objects::{AffineValue, ArmatureValue, CameraValue, SolidValue, ViewValue};
 pub use observed::{DepthValue, ImageValue, KeypointsValue, MaskValue};
 
