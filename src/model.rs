@@ -151,6 +151,7 @@ impl Program {
     }
 
     /// Names of built-in files that stood in for files of the user's own.
+    #[doc(hidden)]
     pub fn embedded(&self) -> &[String] {
         &self.loaded.embedded
     }
@@ -355,11 +356,13 @@ impl Model {
     }
 
     /// The program's exports.
+    #[doc(hidden)]
     pub fn exports(&self) -> &[Export] {
         &self.compiled.exports
     }
 
     /// The program's reports.
+    #[doc(hidden)]
     pub fn reports(&self) -> &[Report] {
         &self.compiled.reports
     }
@@ -412,6 +415,7 @@ impl Model {
     ///
     /// # Errors
     /// If the program cannot be run once, to see what choices it makes.
+    #[doc(hidden)]
     pub fn plan(&self) -> Result<(Arc<[KStmt]>, Option<String>), Error> {
         if let Some(p) = self.compiled.plans.first() {
             return Ok((Arc::clone(&p.body), None));

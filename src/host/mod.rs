@@ -26,15 +26,23 @@
 //! # Ok::<(), pcadlang::Error>(())
 //! ```
 
+#![doc = include_str!("guide.md")]
+
 mod entry;
 mod previous;
 mod seen;
 
+#[doc(inline)]
 pub use crate::dist::{Datum, Distribution, Gradient, ParamError, Support};
+#[doc(inline)]
 pub use crate::infer::KernelCall;
+#[doc(inline)]
 pub use crate::lang::adjoint::Adjoint;
+#[doc(inline)]
 pub use crate::lang::builtins::{Args, Type};
+#[doc(inline)]
 pub use crate::lang::error::{Fault, FaultKind};
+#[doc(inline)]
 pub use crate::lang::value::{Likelihood, Located, Object};
 pub use entry::Entry;
 pub use previous::Previous;

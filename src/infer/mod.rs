@@ -1,9 +1,13 @@
 //! Inference: kernels, plans, chains, diagnostics. Knows traces; knows nothing of pictures.
 
+#![doc = include_str!("guide.md")]
+
 mod build;
+#[doc(hidden)]
 pub mod calibration;
 mod chains;
 mod default_plan;
+#[doc(hidden)]
 pub mod diagnostics;
 pub mod draws;
 mod expr;
@@ -13,9 +17,11 @@ mod init;
 mod kernel;
 mod kernels;
 mod neighbours;
+mod observer;
 mod plain;
 mod plan;
 mod population;
+#[doc(hidden)]
 pub mod predictive;
 mod record;
 mod resampling;
@@ -25,17 +31,24 @@ mod state;
 
 use crate::platform::threads as parallel;
 pub(crate) use crate::platform::threads::in_parallel;
+#[doc(hidden)]
 pub use chains::run_chains;
+#[doc(hidden)]
 pub use default_plan::default_plan;
+#[doc(hidden)]
 pub use foreign::KernelCall;
 pub(crate) use foreign::KernelMaker;
 pub(crate) use init::attempts;
+#[doc(hidden)]
 pub use init::{Start, StartError, starts};
 pub use kernel::{At, Kernel, Outcome, Pick, Scope, decide, recoverable};
-pub use kernels::{
-    Abc, AbcSmc, Block, Delayed, Drift, Elliptical, Gibbs, Hamiltonian, Hmc, Independent, Knn, Mh, Nuts, Optimize,
-    Slice, Smc, Temper,
-};
+#[doc(hidden)]
+pub use kernels::{Abc, AbcSmc, Delayed, Hamiltonian, Hmc, Independent, Knn, Nuts, Optimize, Smc, Temper};
+pub use kernels::{Block, Drift, Elliptical, Gibbs, Mh, Slice};
+#[doc(hidden)]
 pub use neighbours::{Banks, Latent, Latents, Neighbours};
-pub use plan::{ChainError, ChainResult, Checkpoint, Progress, RunOptions, Watch, run_from};
+pub use observer::Observer;
+pub use plan::{ChainError, ChainResult, Progress, RunOptions, Watch};
+#[doc(hidden)]
+pub use plan::{Checkpoint, run_from};
 pub use state::StateError;

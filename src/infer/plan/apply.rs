@@ -110,6 +110,9 @@ impl Runner<'_> {
         }
         self.step += 1;
         self.progress.steps.fetch_add(1, Ordering::Relaxed);
+        if let Some(watch) = &self.options.watch {
+            watch.step(self.chain, self.step, &self.trace);
+        }
         Ok(outcome)
     }
 

@@ -173,6 +173,7 @@ impl<'a> Args<'a> {
     }
 
     /// The error that an array would be too long.
+    #[doc(hidden)]
     pub fn too_many(&self, n: f64) -> Fault {
         let message = format!("{}: an array of {n} elements is too long", self.builtin.full_name());
         Fault::new(FaultKind::Limit, message).with_hint(format!("at most {MAX_ELEMENTS} are made in one go"))
