@@ -33,6 +33,8 @@ const PROMISED: &[(&str, &[&str], &[&str])] = &[
     ("src/infer/kernel.rs", &["At", "Kernel", "Outcome", "Pick", "Scope", "decide", "recoverable"], &["src/infer"]),
     ("src/infer/observer.rs", &[], &["src/infer"]),
     ("src/infer/plan/mod.rs", &["RunOptions", "Progress", "Watch", "ChainResult", "ChainError"], &["src/infer"]),
+    ("src/infer/plan/checkpoint.rs", &["Checkpoint"], &["src/infer"]),
+    ("src/infer/state.rs", &["StateError"], &["src/infer"]),
     ("src/infer/draws.rs", &["Sink", "DrawRow", "Column", "KernelStats"], &["src/infer"]),
     ("src/infer/kernels/mh.rs", &[], &["src/infer"]),
     ("src/infer/kernels/block.rs", &[], &["src/infer"]),

@@ -48,7 +48,7 @@ pub use kernels::{Block, Drift, Elliptical, Gibbs, Mh, Slice};
 #[doc(hidden)]
 pub use neighbours::{Banks, Latent, Latents, Neighbours};
 pub use observer::Observer;
-pub use plan::{ChainError, ChainResult, Progress, RunOptions, Watch};
 #[doc(hidden)]
-pub use plan::{Checkpoint, run_from};
+pub use plan::run_from;
+pub use plan::{ChainError, ChainResult, Checkpoint, Progress, RunOptions, Watch};
 pub use state::StateError;
