@@ -43,6 +43,7 @@ fn modules_depend_one_way() {
         ("lang", &["lang", "syntax", "diag", "dist", "geom", "render", "vision", "num", "rng"]),
         ("trace", &["trace", "lang", "syntax", "diag", "dist", "num", "rng"]),
         ("infer", &["infer", "trace", "lang", "syntax", "diag", "dist", "num", "platform", "rng"]),
+        ("host", &["host", "infer", "lang", "syntax", "diag", "dist", "render", "rng", "Error"]),
         ("report", &["report", "infer", "num"]),
         ("bank", &["bank", "Model", "report", "infer", "trace", "lang", "dist", "render", "vision", "num", "rng"]),
     ];

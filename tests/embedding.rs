@@ -214,6 +214,39 @@ fn embedded_distribution() -> Entry {
     Entry::distribution("d", |_| Err::<pcadlang::dist::Normal, _>(pcadlang::host::Fault::domain("none")))
 }
 
+/// A density that is not a number is impossible, and a host's family may draw anything: no type is guessed for it.
+#[test]
+fn what_a_host_s_distribution_does_wrong_reaches_no_accept_test() {
+    use pcadlang::host::{Datum, Distribution, Gradient, Support};
+    #[derive(Debug)]
+    struct Odd;
+    impl Distribution for Odd {
+        fn name(&self) -> &str {
+            "odd"
+        }
+        fn support(&self) -> Support {
+            Support::Vector(2)
+        }
+        fn sample(&self, rng: &mut pcadlang::rng::Stream) -> Datum {
+            vec![rng.uniform() - 0.5, rng.uniform()].into()
+        }
+        /// The square root of what may be negative.
+        fn log_density(&self, x: &Datum) -> f64 {
+            x.element(0).and_then(|x| x.num()).map_or(f64::NEG_INFINITY, |x| -x.sqrt())
+        }
+        fn gradient(&self, _: &Datum) -> Option<Gradient> {
+            None
+        }
+    }
+    let host = Host::new().with(Entry::distribution("odd", |_| Ok(Odd)).argument("n", Type::Num, "Anything."));
+    let text =
+        "assume x ~ odd(1); observe normal(x[0] + x[1], 1) = 1; infer { init(best_of(20)); repeat 500 { drift(@x); } }";
+    let model = Program::parse(text).unwrap().host(&host).unwrap().compile().unwrap();
+    let posterior = model.run(&RunOptions::default(), 1, 1).unwrap();
+    let x = posterior.quantity("x[0]").unwrap().chains.concat();
+    assert!(x.iter().all(|x| *x >= 0.0) && x.iter().any(|a| *a != x[0]));
+}
+
 /// Names made at run time cost no leak: an entry owns them, and goes with its host.
 #[test]
 fn names_made_at_run_time_are_the_entry_s_own() {

@@ -1,6 +1,7 @@
 //! One thing that a host brings.
 
 use super::Previous;
+use super::checked::Checked;
 use crate::dist::{Dist, Distribution};
 use crate::infer::{Kernel, KernelCall, KernelMaker};
 use crate::lang::adjoint::Adjoint;
@@ -118,12 +119,12 @@ impl Entry {
 
     /// A family of distributions: from its parameters to one of them. A parameter outside its domain is a [`Fault::domain`].
     ///
-    /// [`Gradient::params`](crate::host::Gradient) are by the numbers in the arguments, one after the other.
+    /// A value whose log density is NaN counts as impossible. [`Gradient::params`](crate::host::Gradient) are by the numbers in the arguments, one after the other.
     pub fn distribution<D: Distribution + 'static>(
         name: impl Into<Cow<'static, str>>,
         make: impl Fn(&Args) -> Result<D, Fault> + Send + Sync + 'static,
     ) -> Entry {
-        let make = move |a: &Args| make(a).map(|d| Dist::Custom(Arc::new(d)));
+        let make = move |a: &Args| make(a).map(|d| Dist::Custom(Arc::new(Checked(d))));
         Entry::new(name, "Distributions", Type::Dist, Foreign::Family(Arc::new(make)))
     }
 

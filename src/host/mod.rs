@@ -28,6 +28,7 @@
 
 #![doc = include_str!("guide.md")]
 
+mod checked;
 mod entry;
 mod previous;
 mod seen;
@@ -48,9 +49,9 @@ pub use entry::Entry;
 pub use previous::Previous;
 pub use seen::Seen;
 
+use crate::Error;
 use crate::diag::{Diagnostic, Severity, SourceMap};
 use crate::lang::builtins::{Builtin, Table, doc};
-use crate::model::Error;
 use crate::syntax::{is_keyword, is_name};
 use std::sync::Arc;
 
