@@ -1,25 +1,43 @@
 //! `pcadlang`: a probabilistic CAD language. A program draws a scene from a prior; the engine samples the scenes that
 //! explain a photograph.
 //!
-//! [`Program`] and [`Model`] are the way in; [`trace::Trace`] is the engine's one data structure. Modules depend one way:
-//! `syntax`, `dist`, `geom`, `render` and `vision` know nothing of traces, `infer` knows nothing of pictures.
+//! [`Program`] and [`Model`] are the way in; [`trace::Trace`] is the engine's one data structure; [`host`] is how a program that embeds
+//! the language brings functions, distributions, likelihoods and kernels of its own. What is shown here follows semantic
+//! versioning, is used by the doc-tests, and is listed in `docs/embedding.md`; modules that are public for tests and tools only are hidden.
+//!
+//! Modules depend one way: `syntax`, `dist`, `geom`, `render` and `vision` know nothing of traces, `infer` knows nothing of pictures.
+#![doc = include_str!("guide.md")]
 #![warn(missing_docs)]
 #![forbid(unsafe_code)]
 
+#[doc(hidden)]
 pub mod bank;
 pub mod diag;
+#[doc(hidden)]
 pub mod dist;
+#[doc(hidden)]
 pub mod geom;
+pub mod host;
 pub mod infer;
+#[doc(hidden)]
 pub mod lang;
 mod model;
+#[doc(hidden)]
 pub mod num;
+mod platform;
+#[doc(hidden)]
 pub mod render;
 pub mod report;
 pub mod rng;
+#[doc(hidden)]
 pub mod syntax;
 pub mod trace;
+#[doc(hidden)]
 pub mod vision;
 
 pub use infer::RunOptions;
+#[doc(inline)]
+pub use lang::value::Value;
 pub use model::{Error, Model, Posterior, Program};
+#[doc(inline)]
+pub use render::Camera;

@@ -10,6 +10,7 @@
 //! ```
 
 use crate::diag::{Diagnostic, IntoDiagnostic, Severity, SourceMap, render};
+use crate::host::Host;
 use crate::infer::draws::Sink;
 use crate::infer::{ChainError, ChainResult, Progress, RunOptions, default_plan, run_chains};
 use crate::lang::builtins::data::Options;
@@ -20,6 +21,7 @@ use crate::lang::error::{Fault, FaultKind, RunError};
 use crate::lang::load::{Disk, Loaded, Loader, Nowhere, load, load_text, read, reason};
 use crate::lang::lower::{Compiled, Export, Inputs, Interface, Report, compile, inspect};
 use crate::lang::value::Value;
+use crate::platform::clock;
 use crate::render::Camera;
 use crate::report::{ChainDraws, Memory, Quantity, bytes_hash, quantities, text_hash};
 use crate::rng::{Purpose, StreamKey};
@@ -87,7 +89,7 @@ pub struct Program {
     text: String,
     sets: Vec<(String, String)>,
     data: IndexMap<String, Value>,
-    defaults: FxHashMap<(&'static str, &'static str), Value>,
+    defaults: FxHashMap<(String, String), Value>,
     needs_data: bool,
     builtins: Arc<Table>,
 }
@@ -149,6 +151,7 @@ impl Program {
     }
 
     /// Names of built-in files that stood in for files of the user's own.
+    #[doc(hidden)]
     pub fn embedded(&self) -> &[String] {
         &self.loaded.embedded
     }
@@ -188,9 +191,18 @@ impl Program {
 
     /// The value of an argument wherever a program leaves it out: of a built-in by full name, an argument by name.
     #[must_use]
-    pub fn default_argument(mut self, function: &'static str, argument: &'static str, value: Value) -> Program {
-        self.defaults.insert((function, argument), value);
+    pub fn default_argument(mut self, function: &str, argument: &str, value: Value) -> Program {
+        self.defaults.insert((function.into(), argument.into()), value);
         self
+    }
+
+    /// What the program calls may be the host's too.
+    ///
+    /// # Errors
+    /// If the host brings a name of the language without saying that it replaces it, or something is wrong with what it brings.
+    pub fn host(mut self, host: &Host) -> Result<Program, Error> {
+        self.builtins = host.table()?;
+        Ok(self)
     }
 
     /// Compiles also when `data` items are not given, to check the rest.
@@ -222,13 +234,14 @@ impl Program {
                 }
             }
         }
-        if self.defaults.contains_key(&RENDER) {
+        let render = (RENDER.0.to_owned(), RENDER.1.to_owned());
+        if self.defaults.contains_key(&render) {
             return;
         }
         let keypoints = || self.data.values().find_map(|v| v.downcast::<KeypointsValue>().and_then(|k| k.0.size()));
         if let Some((width, height)) = picture.or_else(keypoints) {
             let camera = CameraValue(Camera::default_for(width, height));
-            self.defaults.insert(RENDER, Value::object(camera));
+            self.defaults.insert(render, Value::object(camera));
         }
     }
 
@@ -343,11 +356,13 @@ impl Model {
     }
 
     /// The program's exports.
+    #[doc(hidden)]
     pub fn exports(&self) -> &[Export] {
         &self.compiled.exports
     }
 
     /// The program's reports.
+    #[doc(hidden)]
     pub fn reports(&self) -> &[Report] {
         &self.compiled.reports
     }
@@ -400,6 +415,7 @@ impl Model {
     ///
     /// # Errors
     /// If the program cannot be run once, to see what choices it makes.
+    #[doc(hidden)]
     pub fn plan(&self) -> Result<(Arc<[KStmt]>, Option<String>), Error> {
         if let Some(p) = self.compiled.plans.first() {
             return Ok((Arc::clone(&p.body), None));
@@ -439,6 +455,10 @@ impl Model {
         progress: &Progress,
         sinks: Vec<Box<dyn Sink>>,
     ) -> Result<Vec<Result<ChainResult, ChainError>>, Error> {
+        if options.time.is_some() && !clock::RUNS {
+            let d = Diagnostic::new(Severity::Error, "there is no clock on this platform, so a run cannot end by time");
+            return Err(Error { diagnostics: vec![d.hint("bound it by `steps`")], sources: self.sources.clone() });
+        }
         let (plan, _) = self.plan()?;
         Ok(run_chains(self.code(), &plan, options, threads, progress, sinks))
     }

@@ -2,6 +2,17 @@
 //!
 //! A stream is a function of a key (seed, chain, purpose) and a place (step, site, lane). Nothing is carried from one to the next,
 //! so the order in which numbers are asked for, and the number of threads, change nothing.
+//!
+//! ```
+//! use pcadlang::rng::{Purpose, Stream, StreamKey};
+//! // Seed, chain and purpose; then a step, a site, and which of several alternatives: the same place, the same numbers.
+//! let key = StreamKey::new(1, 0, Purpose::KERNEL);
+//! let (mut a, mut b): (Stream, Stream) = (key.stream(7, 0, 0), key.stream(7, 0, 0));
+//! assert_eq!(a.next_u64(), b.next_u64());
+//! assert!((0.0..1.0).contains(&a.uniform()) && a.open_uniform() > 0.0 && a.standard_normal().is_finite());
+//! assert!(a.index(6) < 6 && a.weighted(&[0.0, 2.0], 2.0) == 1);
+//! assert_ne!(a.sample::<f64>(rand_distr::StandardUniform), b.sample::<f64>(rand_distr::StandardUniform));
+//! ```
 
 use rand::TryRng;
 use std::convert::Infallible;

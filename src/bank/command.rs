@@ -32,6 +32,9 @@ pub(super) fn features(command: &str, picture: &RgbImage) -> Result<Vec<f32>, Ba
     if !command.contains(PICTURE) {
         return Err(wrong(format!("`{PICTURE}` must stand where the picture's file goes")));
     }
+    if cfg!(target_family = "wasm") {
+        return Err(wrong("no command can be run on this platform".into()));
+    }
     let number = NEXT.fetch_add(1, Ordering::Relaxed);
     let file = Temporary(std::env::temp_dir().join(format!("pcadlang-{}-{number}.png", std::process::id())));
     let bytes = png(picture).map_err(|e| wrong(e.to_string()))?;

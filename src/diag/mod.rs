@@ -3,12 +3,16 @@
 //! Every phase (syntax, names, types, run time) has its own error type and turns it into a [`Diagnostic`] in one place,
 //! by [`IntoDiagnostic`]. Nothing here prints or reads files: [`render`] returns text.
 
+#![doc = include_str!("guide.md")]
+
 mod diagnostic;
 mod excerpt;
 mod nearest;
 mod render;
 mod source;
 
+#[doc(inline)]
+pub use crate::syntax::span::{FileId, Span};
 pub use diagnostic::{Diagnostic, IntoDiagnostic, Label, Severity};
 pub use nearest::nearest;
 pub use render::render;

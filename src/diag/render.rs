@@ -4,7 +4,10 @@ use super::diagnostic::{Diagnostic, Severity};
 use super::excerpt::Excerpts;
 use super::source::SourceMap;
 use codespan_reporting::diagnostic as codespan;
-use codespan_reporting::term::{self, Config, termcolor};
+use codespan_reporting::files::Error;
+use codespan_reporting::term::{self, Config};
+
+type Shown = codespan::Diagnostic<crate::syntax::span::FileId>;
 
 /// The diagnostics as the user sees them, in order, a blank line after each; with ANSI colours if `color`.
 ///
@@ -16,19 +19,28 @@ pub fn render(map: &SourceMap, diagnostics: &[Diagnostic], color: bool) -> Strin
         let shown = to_codespan(&files, diagnostic);
         let config = Config { tab_width: 2, ..Config::default() };
         // Writing to memory does not fail, and every label was found in `files`.
-        let written = if color {
-            term::emit_to_write_style(&mut termcolor::Ansi::new(&mut out), &config, &files, &shown)
-        } else {
-            term::emit_to_io_write(&mut out, &config, &files, &shown)
-        };
-        if written.is_err() {
+        if write(&mut out, &config, &files, &shown, color).is_err() {
             out.extend_from_slice(format!("error: {}\n", diagnostic.message).as_bytes());
         }
     }
     String::from_utf8_lossy(&out).into_owned()
 }
 
-fn to_codespan(files: &Excerpts, diagnostic: &Diagnostic) -> codespan::Diagnostic<crate::syntax::span::FileId> {
+#[cfg(feature = "cli")]
+fn write(out: &mut Vec<u8>, config: &Config, files: &Excerpts, shown: &Shown, color: bool) -> Result<(), Error> {
+    match color {
+        true => term::emit_to_write_style(&mut term::termcolor::Ansi::new(out), config, files, shown),
+        false => term::emit_to_io_write(out, config, files, shown),
+    }
+}
+
+/// A build without the command has no colours.
+#[cfg(not(feature = "cli"))]
+fn write(out: &mut Vec<u8>, config: &Config, files: &Excerpts, shown: &Shown, _color: bool) -> Result<(), Error> {
+    term::emit_to_io_write(out, config, files, shown)
+}
+
+fn to_codespan(files: &Excerpts, diagnostic: &Diagnostic) -> Shown {
     let severity = match diagnostic.severity {
         Severity::Error => codespan::Severity::Error,
         Severity::Warning => codespan::Severity::Warning,
@@ -93,6 +105,7 @@ mod tests {
         }
     }
 
+    #[cfg(feature = "cli")]
     #[test]
     fn colours_only_when_asked() {
         let mut map = SourceMap::new();

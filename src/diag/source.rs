@@ -33,16 +33,19 @@ impl SourceFile {
     }
 
     /// The number of lines, at least 1.
+    #[doc(hidden)]
     pub fn line_count(&self) -> usize {
         self.line_starts.len()
     }
 
     /// The index (from 0) of the line that holds a byte; the last line for a byte past the end.
+    #[doc(hidden)]
     pub fn line_index(&self, byte: usize) -> usize {
         self.line_starts.partition_point(|&start| start <= byte).saturating_sub(1)
     }
 
     /// The byte range of a line, with its line break; empty at the end of the text for a line past the last.
+    #[doc(hidden)]
     pub fn line_range(&self, index: usize) -> std::ops::Range<usize> {
         let at = |i: usize| self.line_starts.get(i).copied().unwrap_or(self.text.len());
         at(index)..at(index.saturating_add(1))
@@ -80,6 +83,7 @@ impl SourceMap {
     /// # Errors
     /// A diagnostic that points at the first byte that is not UTF-8, or says that the file is too large. The file is
     /// added in any case (with replacement characters, or empty), so that the diagnostic can be rendered.
+    #[doc(hidden)]
     pub fn add_bytes(&mut self, name: &str, bytes: &[u8]) -> Result<FileId, Diagnostic> {
         if bytes.len() > MAX_SOURCE_BYTES {
             let id = self.add(name, "");

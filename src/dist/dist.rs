@@ -99,7 +99,7 @@ macro_rules! forward {
 impl Dist {
     forward! {
         /// See [`Distribution::name`].
-        name() -> &'static str;
+        name() -> &str;
         /// See [`Distribution::support`].
         support() -> Support;
         /// See [`Distribution::sample`].

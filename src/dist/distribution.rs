@@ -19,7 +19,7 @@ pub struct Gradient {
 /// its values follow when its parameters move. By default the stored form is the value itself.
 pub trait Distribution: fmt::Debug + Send + Sync {
     /// The name in the language.
-    fn name(&self) -> &'static str;
+    fn name(&self) -> &str;
 
     /// The space of its values.
     fn support(&self) -> Support;
@@ -48,6 +48,13 @@ pub trait Distribution: fmt::Debug + Send + Sync {
         None
     }
 
+    /// Whether its bounds are parameters, so that the support moves with them. Bounds that are the same for all parameters may say
+    /// so here: gradients by the parameters of one that moves are not known.
+    fn has_moving_support(&self) -> bool {
+        use Support::*;
+        matches!(self.support(), AtLeast { .. } | AtMost { .. } | Interval { .. } | Ascending(..))
+    }
+
     /// Whether values are single numbers.
     fn is_scalar(&self) -> bool {
         self.support().is_number()
@@ -60,36 +67,43 @@ pub trait Distribution: fmt::Debug + Send + Sync {
     }
 
     /// Whether the stored form is white noise.
+    #[doc(hidden)]
     fn is_stored_whitened(&self) -> bool {
         false
     }
 
     /// Draws in stored form.
+    #[doc(hidden)]
     fn sample_stored(&self, rng: &mut Stream) -> Datum {
         self.sample(rng)
     }
 
     /// The log density of a stored form, in its own space.
+    #[doc(hidden)]
     fn log_density_stored(&self, s: &Datum) -> f64 {
         self.log_density(s)
     }
 
     /// The derivatives of [`Distribution::log_density_stored`].
+    #[doc(hidden)]
     fn gradient_stored(&self, s: &Datum) -> Option<Gradient> {
         self.gradient(s)
     }
 
     /// The value of a stored form.
+    #[doc(hidden)]
     fn realise(&self, s: &Datum) -> Datum {
         s.clone()
     }
 
     /// The stored form of a value; `None` if it does not fit.
+    #[doc(hidden)]
     fn unrealise(&self, value: &Datum) -> Option<Datum> {
         Some(value.clone())
     }
 
     /// The space of stored forms.
+    #[doc(hidden)]
     fn stored_support(&self) -> Support {
         self.support()
     }

@@ -35,7 +35,7 @@ impl Product {
 
 impl Distribution for Product {
     /// That of its elements if they are of one family.
-    fn name(&self) -> &'static str {
+    fn name(&self) -> &str {
         let first = self.parts.first().map_or("product", Dist::name);
         if self.parts.iter().all(|p| p.name() == first) { first } else { "product" }
     }

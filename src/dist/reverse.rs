@@ -23,6 +23,7 @@ impl Dist {
             Dist::Uniform(_) | Dist::TruncatedNormal(_) | Dist::HalfCauchy(_) => true,
             Dist::Iid(d) => d.one().has_moving_support(),
             Dist::Product(d) => d.parts().iter().any(Dist::has_moving_support),
+            Dist::Custom(d) => d.has_moving_support(),
             Dist::Ordered(_) | Dist::Mixture(_) => matches!(
                 self.support(),
                 Support::Interval { .. } | Support::AtLeast { .. } | Support::AtMost { .. } | Support::Ascending(..)

@@ -102,6 +102,7 @@ impl Support {
     }
 
     /// The same into a list that is used again; false, and the list empty, if the support is not finite.
+    #[doc(hidden)]
     pub fn list_values(&self, values: &mut Vec<Datum>) -> bool {
         values.clear();
         match self {
@@ -138,6 +139,7 @@ impl Support {
 
     /// Whether a number is inside.
     #[inline]
+    #[doc(hidden)]
     pub fn contains_num(&self, x: f64) -> bool {
         match self {
             Support::Real => x.is_finite(),

@@ -1,6 +1,7 @@
 //! From the calls people write in inference blocks to kernels.
 
 use super::expr::{Scope, evaluate};
+use super::foreign::build_foreign;
 use super::kernel::Kernel;
 use super::kernels::{
     Abc, AbcSmc, Block, Delayed, Drift, Elliptical, Gibbs, Hmc, Knn, Mh, Nuts, Optimize, Own, Slice, Smc, Temper,
@@ -8,6 +9,7 @@ use super::kernels::{
 use super::plan::banks::neighbours;
 use super::plan::{RunOptions, argument, call};
 use super::selection::{fail, scope, selector};
+use crate::lang::builtins::Foreign;
 use crate::lang::error::RunError;
 use crate::lang::value::Value;
 use crate::syntax::ast::{Address, Arg, Expr, ExprKind, KernelDecl, Key, Param};
@@ -42,7 +44,14 @@ pub(super) fn build(
         let kernel = Own::new(Arc::clone(env.code), k.clone(), arguments, env.started);
         return Ok(Built { kernel: Box::new(kernel), signature });
     }
-    if env.code.builtins.find("", name).is_some_and(|i| env.code.builtins.get(i).is_planned()) {
+    let builtins = Arc::clone(&env.code.builtins);
+    let known = builtins.find("", name).map(|i| builtins.get(i));
+    if let Some(b) = known
+        && let Some(Foreign::Kernel(maker)) = &b.foreign
+    {
+        return build_foreign(e, (b, maker), args, frozen, options, env);
+    }
+    if known.is_some_and(|b| b.is_planned()) {
         let mut e = fail(e.span, format!("the kernel `{name}` is not available yet in this version"));
         e.hint = Some(format!("those that are: {AVAILABLE}"));
         return Err(e);
@@ -129,7 +138,7 @@ pub(super) fn build(
 const AVAILABLE: &str =
     "mh, block, drift, gibbs, elliptical, hmc, mala, nuts, slice, knn, delayed, temper, smc, abc, optimize";
 
-fn without(selector: Selector, frozen: &Selector) -> Selector {
+pub(super) fn without(selector: Selector, frozen: &Selector) -> Selector {
     match frozen {
         Selector::Nothing => selector,
         _ => Selector::Minus(Box::new(selector), Box::new(frozen.clone())),

@@ -47,6 +47,7 @@ impl Column {
     }
 
     /// A column of `n` numbers.
+    #[doc(hidden)]
     pub fn vector(name: impl Into<String>, n: usize) -> Self {
         Column { name: name.into(), shape: Shape::Vector(n) }
     }
@@ -190,6 +191,7 @@ impl SiteStats {
 
 impl KernelStats {
     /// Adds what a step did, and the time it took.
+    #[doc(hidden)]
     pub fn add(&mut self, outcome: &super::Outcome, time: std::time::Duration) {
         self.proposals += u64::from(outcome.proposals);
         self.accepted += u64::from(outcome.accepted);
@@ -204,6 +206,7 @@ impl KernelStats {
     }
 
     /// The kernels of several chains, added up by name, in order of first appearance.
+    #[doc(hidden)]
     pub fn total<'a>(stats: impl IntoIterator<Item = &'a KernelStats>) -> Vec<KernelStats> {
         let mut sum: indexmap::IndexMap<&str, KernelStats> = indexmap::IndexMap::new();
         let all: Vec<&KernelStats> = stats.into_iter().collect();

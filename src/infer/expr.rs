@@ -7,10 +7,10 @@ use crate::lang::code::{Code, Operand};
 use crate::lang::error::RunError;
 use crate::lang::index::index_value;
 use crate::lang::value::Value;
+use crate::platform::clock::Instant;
 use crate::syntax::ast::{BinaryOp, Expr, ExprKind, UnaryOp};
 use crate::trace::{Address, Draws, Trace};
 use std::sync::Arc;
-use std::time::Instant;
 
 /// What an expression can see.
 pub(crate) struct Scope<'a> {

@@ -7,13 +7,13 @@ use crate::lang::address::Address;
 use crate::lang::code::Code;
 use crate::lang::error::RunError;
 use crate::lang::value::Value;
+use crate::platform::clock::Instant;
 use crate::rng::{Purpose, StreamKey};
 use crate::syntax::ast::{Expr, KStmt, KStmtKind};
 use crate::syntax::span::Span;
 use crate::trace::{Draws, Limits, Trace, TraceResult};
 use std::fmt;
 use std::sync::Arc;
-use std::time::Instant;
 
 /// How a chain starts: with the best of so many draws from the prior, by log joint density.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]

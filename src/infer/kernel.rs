@@ -276,7 +276,7 @@ pub(crate) fn accepts(log_ratio: f64, rng: &mut Stream) -> bool {
 }
 
 /// Keeps or undoes the pending proposal.
-pub(crate) fn decide(trace: &mut Trace, log_ratio: f64, rng: &mut Stream) -> Outcome {
+pub fn decide(trace: &mut Trace, log_ratio: f64, rng: &mut Stream) -> Outcome {
     let accepted = accepts(log_ratio, rng);
     if accepted {
         trace.commit()
@@ -287,7 +287,7 @@ pub(crate) fn decide(trace: &mut Trace, log_ratio: f64, rng: &mut Stream) -> Out
 }
 
 /// Separates proposals that lead where the program has no value from failures of the program.
-pub(crate) fn recoverable<T>(result: TraceResult<T>) -> TraceResult<Option<T>> {
+pub fn recoverable<T>(result: TraceResult<T>) -> TraceResult<Option<T>> {
     match result {
         Ok(x) => Ok(Some(x)),
         Err(e) if RunError::is_recoverable(&e) => Ok(None),

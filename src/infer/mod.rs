@@ -1,21 +1,27 @@
 //! Inference: kernels, plans, chains, diagnostics. Knows traces; knows nothing of pictures.
 
+#![doc = include_str!("guide.md")]
+
 mod build;
+#[doc(hidden)]
 pub mod calibration;
 mod chains;
 mod default_plan;
+#[doc(hidden)]
 pub mod diagnostics;
 pub mod draws;
 mod expr;
 mod force;
+mod foreign;
 mod init;
 mod kernel;
 mod kernels;
 mod neighbours;
-mod parallel;
+mod observer;
 mod plain;
 mod plan;
 mod population;
+#[doc(hidden)]
 pub mod predictive;
 mod record;
 mod resampling;
@@ -23,16 +29,26 @@ mod selection;
 mod sites;
 mod state;
 
+use crate::platform::threads as parallel;
+pub(crate) use crate::platform::threads::in_parallel;
+#[doc(hidden)]
 pub use chains::run_chains;
+#[doc(hidden)]
 pub use default_plan::default_plan;
+#[doc(hidden)]
+pub use foreign::KernelCall;
+pub(crate) use foreign::KernelMaker;
 pub(crate) use init::attempts;
+#[doc(hidden)]
 pub use init::{Start, StartError, starts};
-pub use kernel::{At, Kernel, Outcome, Pick, Scope};
-pub use kernels::{
-    Abc, AbcSmc, Block, Delayed, Drift, Elliptical, Gibbs, Hamiltonian, Hmc, Independent, Knn, Mh, Nuts, Optimize,
-    Slice, Smc, Temper,
-};
+pub use kernel::{At, Kernel, Outcome, Pick, Scope, decide, recoverable};
+#[doc(hidden)]
+pub use kernels::{Abc, AbcSmc, Delayed, Hamiltonian, Hmc, Independent, Knn, Nuts, Optimize, Smc, Temper};
+pub use kernels::{Block, Drift, Elliptical, Gibbs, Mh, Slice};
+#[doc(hidden)]
 pub use neighbours::{Banks, Latent, Latents, Neighbours};
-pub(crate) use parallel::in_parallel;
-pub use plan::{ChainError, ChainResult, Checkpoint, Progress, RunOptions, Watch, run_from};
+pub use observer::Observer;
+#[doc(hidden)]
+pub use plan::run_from;
+pub use plan::{ChainError, ChainResult, Checkpoint, Progress, RunOptions, Watch};
 pub use state::StateError;

@@ -170,6 +170,7 @@ impl Adjoint {
     }
 
     /// Adds to what indexing a value with these keys picks out, one key after the other.
+    #[doc(hidden)]
     pub fn add_at(&mut self, base: &Value, keys: &[Value], by: Adjoint) {
         let Some((key, rest)) = keys.split_first() else { return self.add(by) };
         if by.is_zero() {
@@ -200,6 +201,7 @@ impl Adjoint {
     }
 
     /// In the shape of a record's fields, by position.
+    #[doc(hidden)]
     pub fn add_position(&mut self, base: &Value, i: usize, by: Adjoint) {
         match base {
             Value::Record(r) => {

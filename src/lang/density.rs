@@ -143,7 +143,7 @@ pub(crate) fn by_arguments(a: &Args, dist: &Dist, params: &[f64]) -> SmallVec<[A
     let one = |i: usize| -> Adjoint {
         match a.get(i) {
             _ if covariance == Some(i) => Adjoint::Unknown,
-            Value::Num(_) if dist.name() == "gp" => {
+            Value::Num(_) if matches!(dist, Dist::Gp(_)) => {
                 Adjoint::Num(take(params.len()).map_or(0.0, |all| all.iter().sum()))
             }
             Value::Num(_) => take(1).map_or(Adjoint::Zero, |g| Adjoint::Num(g[0])),

@@ -59,6 +59,7 @@ impl Fault {
     }
 
     /// The same with a hint for a name that is not known: the known one most like it, or all of them after `introduced`.
+    #[doc(hidden)]
     pub fn with_nearest<'a>(self, name: &str, introduced: &str, known: impl Iterator<Item = &'a str> + Clone) -> Self {
         match crate::diag::nearest(name, known.clone()) {
             Some(near) => self.with_hint(format!("did you mean `{near}`?")),

@@ -10,7 +10,7 @@ use crate::syntax::span::{FileId, Span};
 use std::io;
 
 /// Where files come from.
-pub trait Loader {
+pub trait Loader: Send + Sync {
     /// The bytes of a file.
     ///
     /// # Errors

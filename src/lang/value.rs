@@ -78,6 +78,7 @@ pub trait Object: Any + fmt::Debug + Send + Sync {
         None
     }
     /// The adjoints of both sides of `self * other`; `None` where they are not known.
+    #[doc(hidden)]
     fn pull_product(&self, _other: &Value, _by: &Adjoint) -> Option<[Adjoint; 2]> {
         None
     }
@@ -112,7 +113,7 @@ pub struct Located {
 /// and kept with the value.
 pub trait Likelihood: fmt::Debug + Send + Sync {
     /// What errors call it.
-    fn name(&self) -> &'static str;
+    fn name(&self) -> &str;
     /// The log density; never NaN.
     ///
     /// # Errors
@@ -144,6 +145,7 @@ pub trait Likelihood: fmt::Debug + Send + Sync {
 
 impl Value {
     /// What a `for` over it goes through: its elements, or the names of a record.
+    #[doc(hidden)]
     pub fn passes(&self) -> Vec<Value> {
         match self {
             Value::Record(r) => r.keys().map(|k| Value::Str(Arc::clone(k))).collect(),

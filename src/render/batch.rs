@@ -6,7 +6,7 @@
 
 use super::{Camera, Contours};
 use crate::geom::Solid;
-use rayon::prelude::*;
+use crate::platform::threads::Pool;
 
 /// A scene to be drawn.
 ///
@@ -111,24 +111,20 @@ pub trait BatchRenderer: Sync {
 
 /// Draws on so many of the processor's cores.
 pub struct Cores {
-    /// None where no threads can be had: then one scene is drawn after the other.
-    pool: Option<rayon::ThreadPool>,
+    pool: Pool,
 }
 
 impl Cores {
     /// On so many threads (0: as many as there are cores), which stay until this is dropped, with what they keep for drawing.
     pub fn new(threads: usize) -> Cores {
-        Cores { pool: rayon::ThreadPoolBuilder::new().num_threads(threads).build().ok() }
+        Cores { pool: Pool::new(threads) }
     }
 }
 
 impl BatchRenderer for Cores {
     fn contours(&self, scenes: &[Scene]) -> ContourBatch {
         let draw = |scene: &Scene| Contours::of(&scene.solid, &scene.camera);
-        let drawn: Vec<Contours> = match &self.pool {
-            Some(pool) => pool.install(|| scenes.par_iter().map(draw).collect()),
-            None => scenes.iter().map(draw).collect(),
-        };
+        let drawn = self.pool.map(scenes.iter().collect(), draw);
         let mut batch = ContourBatch::default();
         drawn.iter().for_each(|contours| batch.push(contours));
         batch

@@ -3,30 +3,45 @@
 //! Nothing here prints or decides; it turns results into text and files. It knows draws, diagnostics and plain pixel
 //! buffers, not programs, traces or the renderer.
 
+#![doc = include_str!("guide.md")]
+
 mod chain_file;
+#[doc(hidden)]
 pub mod checkpoint;
 pub mod csv;
 mod draws;
+#[doc(hidden)]
 pub mod evaluation;
 mod hash;
+#[doc(hidden)]
 pub mod html;
 mod modes;
 mod moments;
+#[doc(hidden)]
 pub mod npy;
 mod number;
+#[doc(hidden)]
 pub mod pictures;
 mod rundir;
 mod sinks;
+#[doc(hidden)]
 pub mod table;
 mod warnings;
 mod whole;
 
+pub use crate::infer::diagnostics::Summary;
+#[doc(hidden)]
 pub use chain_file::ChainFile;
 pub use draws::{ChainDraws, Quantity, quantities};
+#[doc(hidden)]
 pub use hash::{bytes_hash, text_hash};
+#[doc(hidden)]
 pub use modes::{DISAGREE, Mode, modes, modes_table, r_hat_text};
+#[doc(hidden)]
 pub use moments::{Moments, Point};
+#[doc(hidden)]
 pub use number::{number, seconds};
 pub use rundir::{RunDir, RunDirError};
 pub use sinks::{Memory, Tee};
+#[doc(hidden)]
 pub use warnings::warnings;

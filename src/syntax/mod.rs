@@ -26,6 +26,7 @@ pub use error::{AddressError, MAX_ERRORS, SyntaxError, SyntaxErrorKind};
 pub use lexer::MAX_TOKENS;
 pub use parse::{parse, parse_expr};
 pub use print::{print, print_expr};
+pub(crate) use token::{is_keyword, is_name};
 
 lalrpop_util::lalrpop_mod!(
     #[allow(clippy::all, missing_docs, unused, unreachable_pub)]

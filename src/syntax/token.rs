@@ -304,6 +304,11 @@ fn number<'s>(lexer: &mut logos::Lexer<'s, Token<'s>>) -> Option<f64> {
     lexer.slice().parse().ok()
 }
 
+/// Whether a text is a word of the grammar.
+pub(crate) fn is_keyword(text: &str) -> bool {
+    is_name(text) && !matches!(Token::lexer(text).next(), Some(Ok(Token::Name(_))))
+}
+
 /// Whether a text is a name (or a keyword): an ASCII letter or `_`, then letters, digits and `_`.
 pub(crate) fn is_name(text: &str) -> bool {
     let mut bytes = text.bytes();

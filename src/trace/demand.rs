@@ -7,11 +7,13 @@
 use super::graph::Graph;
 use super::journal::Entry;
 use super::node::*;
+use crate::lang::builtins::Before;
 use crate::lang::code::{Code, Op};
 use crate::lang::error::{FaultKind, RunError};
 use crate::lang::value::Value;
 use rustc_hash::FxHashMap;
 use smallvec::SmallVec;
+use std::sync::Arc;
 
 /// What became of one attempt to evaluate a node.
 pub(crate) enum Step {
@@ -214,12 +216,12 @@ impl Graph {
         }
         let held = self.nodes[n as usize].flags & HELD != 0;
         let old = match self.nodes[n as usize].side.as_deref() {
-            Some(Side::Deps(old)) => old.clone(),
+            Some(Side::Deps(old) | Side::Kept(Kept { deps: old, .. })) => old.clone(),
             Some(Side::Choice(c)) => c.deps.clone(),
             Some(Side::Total(t)) => t.deps.clone(),
             _ => Deps::new(),
         };
-        if old == deps {
+        if old == deps && !matches!(self.nodes[n as usize].side.as_deref(), Some(Side::Kept(_))) {
             return;
         }
         if held {
@@ -236,6 +238,27 @@ impl Graph {
                 self.note(Entry::TotalDeps(n, old));
             }
             _ => self.set_side(n, if deps.is_empty() { None } else { Some(Side::Deps(deps)) }),
+        }
+    }
+
+    /// Keeps the evaluation of an incremental function, and what else the node now holds.
+    pub fn keep(&mut self, n: NodeId, deps: Deps, before: Before) {
+        let old = match self.nodes[n as usize].side.as_deref() {
+            Some(Side::Deps(old) | Side::Kept(Kept { deps: old, .. })) => old.clone(),
+            _ => Deps::new(),
+        };
+        if self.nodes[n as usize].flags & HELD != 0 && old != deps {
+            deps.iter().for_each(|d| self.acquire(*d, n, true));
+            old.iter().for_each(|d| self.release(*d, true));
+        }
+        self.set_side(n, Some(Side::Kept(Kept { deps, before: Arc::new(before) })));
+    }
+
+    /// What an incremental function may start from.
+    pub fn kept(&self, n: NodeId) -> Option<&Before> {
+        match self.nodes[n as usize].side.as_deref() {
+            Some(Side::Kept(k)) if self.incremental => Some(&k.before),
+            _ => None,
         }
     }
 

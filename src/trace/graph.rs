@@ -334,7 +334,7 @@ impl Graph {
     /// The part of [`Graph::each_dep`] that is not operands.
     pub fn each_side_dep(&self, code: &Code, n: NodeId, mut f: impl FnMut(NodeId, bool)) {
         match self.nodes[n as usize].side.as_deref() {
-            Some(Side::Deps(deps)) => deps.iter().for_each(|d| f(*d, true)),
+            Some(Side::Deps(deps) | Side::Kept(Kept { deps, .. })) => deps.iter().for_each(|d| f(*d, true)),
             Some(Side::Child(c)) if c.result != NONE => f(c.result, !self.is_owned_result(code, c.result, n)),
             Some(Side::MemoCall(c)) => {
                 c.deps.iter().for_each(|d| f(*d, true));

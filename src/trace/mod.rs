@@ -4,6 +4,8 @@
 //! incremental update, *commit* or *roll back*. A choice that no observation asks for is not part of a trace; it is drawn
 //! when a [`query`](Trace::query) asks for it, from its prior given the rest.
 
+#![doc = include_str!("guide.md")]
+
 mod assign;
 mod choices;
 mod demand;
@@ -37,8 +39,9 @@ pub use select::{ChoiceKind, Pattern, PatternSegment, Selector};
 
 use crate::dist::{Datum, Dist};
 use crate::lang::code::{Code, DistSpec, Op, Operand};
-use crate::lang::error::RunError;
+pub use crate::lang::error::RunError;
 use crate::lang::value::{Likelihood, Located, Value};
+#[doc(hidden)]
 pub use gradient::Recording;
 use graph::Graph;
 use journal::Before;
@@ -494,11 +497,13 @@ impl Trace {
     }
 
     /// Starts to note which operations are executed.
+    #[doc(hidden)]
     pub fn watch(&mut self) {
         self.graph.watched = Some(Vec::new());
     }
 
     /// What was executed since [`Trace::watch`]: the text of each expression, where the source is at hand by its span.
+    #[doc(hidden)]
     pub fn executed(&mut self) -> Vec<crate::syntax::span::Span> {
         let log = self.graph.watched.take().unwrap_or_default();
         log.into_iter().map(|(b, s)| self.code.blocks[b as usize].spans[s as usize]).collect()

@@ -4,6 +4,7 @@
 //! the score, and how many evaluated nodes (or effects) hold it. What only structural nodes need is boxed beside it.
 
 use crate::dist::Datum;
+use crate::lang::builtins::Before;
 use crate::lang::key::Key;
 use crate::lang::value::Value;
 use crate::num::ExactSum;
@@ -80,6 +81,8 @@ const _: () = assert!(size_of::<Node>() == 64);
 pub(crate) enum Side {
     /// Nodes held besides the operands: the element an index found, the elements a gather read.
     Deps(Deps),
+    /// What an incremental function of a host starts from next time, and nodes held besides the operands.
+    Kept(Kept),
     /// `if` and calls of user functions.
     Child(Child),
     /// A call that went through `mem`.
@@ -98,6 +101,15 @@ pub(crate) enum Side {
 
 /// Nodes held besides the operands.
 pub(crate) type Deps = SmallVec<[NodeId; 4]>;
+
+/// The last evaluation of an incremental function.
+#[derive(Clone, Debug)]
+pub(crate) struct Kept {
+    /// Nodes held besides the operands.
+    pub deps: Deps,
+    /// The evaluation.
+    pub before: Arc<Before>,
+}
 
 /// A call that went through `mem`.
 #[derive(Clone, Debug)]

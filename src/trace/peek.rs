@@ -253,8 +253,12 @@ impl Graph {
         let v = match self.op(code, n) {
             Op::Prim { builtin, args } => {
                 let values = self.peek_all(code, peek, value, frame, args)?;
-                apply(code.builtins.get(*builtin), &refs(&values))
-                    .map_err(|f| self.fail(code, n, f.kind, f.message, f.hint))?
+                let (builtin, values) = (code.builtins.get(*builtin), refs(&values));
+                let made = match builtin.resume(&values, self.kept(n)) {
+                    None => apply(builtin, &values),
+                    Some(made) => made.map(|b| b.value),
+                };
+                made.map_err(|f| self.fail(code, n, f.kind, f.message, f.hint))?
             }
             Op::Array(items) => Value::from_elements(self.peek_all(code, peek, value, frame, items)?.into_vec()),
             Op::Record { names, values } => {

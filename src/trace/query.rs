@@ -11,6 +11,7 @@ impl Trace {
     ///
     /// # Errors
     /// What goes wrong while they are evaluated.
+    #[doc(hidden)]
     pub fn query(&mut self, operands: &[Operand], draws: Draws) -> TraceResult<Vec<Value>> {
         self.asked(operands, draws, |_, values| Ok(values))
     }
@@ -19,6 +20,7 @@ impl Trace {
     ///
     /// # Errors
     /// As [`Trace::query`].
+    #[doc(hidden)]
     pub fn imagine<T>(
         &mut self,
         operands: &[Operand],
@@ -63,6 +65,7 @@ impl Trace {
     ///
     /// # Errors
     /// What goes wrong while it is evaluated; `None` if there is no such observation or it has no surrogate.
+    #[doc(hidden)]
     pub fn surrogate(&mut self, address: &Address, draws: Draws) -> TraceResult<Option<f64>> {
         let Some((n, _)) = self.scored().into_iter().find(|(n, _)| self.graph.address(&self.code, *n) == *address)
         else {

@@ -10,9 +10,10 @@ mod reverse;
 use self::reverse::Reverse;
 use super::contour_map::ContourMap;
 use super::elements::{ComparatorError, Element, Elements, check};
-use super::field::{CHANNELS, Edges, PER_RADIAN, channels_of, side_by_side, turn_between};
+use super::field::{CHANNELS, Edges, PER_RADIAN, channels_of, turn_between};
 use crate::num::LN_SQRT_2PI;
 use crate::num::simd::vectorised;
+use crate::platform::threads::side_by_side;
 
 pub use self::reverse::Scratch;
 

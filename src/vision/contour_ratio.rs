@@ -17,7 +17,8 @@ use self::background::scores;
 use self::credit::{Capacity, NO_GROUP};
 use super::contour_map::ContourMap;
 use super::elements::{ComparatorError, Elements, check};
-use super::field::{CHANNELS, Edge, Edges, channels_of, side_by_side, turn_between};
+use super::field::{CHANNELS, Edge, Edges, channels_of, turn_between};
+use crate::platform::threads::side_by_side;
 
 pub use self::credit::Scratch;
 

@@ -26,6 +26,9 @@ pub enum VisionError {
     /// The bytes are not those of a PNG or JPEG picture.
     #[error("not a picture: the file does not begin as PNG or JPEG files do{0}")]
     NotAnImage(&'static str),
+    /// The build cannot decode pictures.
+    #[error("this build reads no PNG or JPEG: it was made without the feature `codecs`")]
+    NoCodecs,
     /// The picture ends early.
     #[error("the picture is cut short: the file ends before all of its pixels")]
     Truncated,

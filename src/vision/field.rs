@@ -160,14 +160,3 @@ pub(super) fn channels_of(tx: f32, ty: f32) -> (usize, usize, f32) {
     let low = (k as usize).min(CHANNELS - 1);
     (low, (low + 1) % CHANNELS, k - low as f32)
 }
-
-/// Does `work` for every part, each on a thread of its own, and waits for all. Not rayon's threads: whoever waits here may hold a lock
-/// that a task of theirs, which they would take up meanwhile, waits for.
-pub(super) fn side_by_side<T: Send>(parts: impl IntoIterator<Item = T>, work: impl Fn(usize, T) + Sync) {
-    let work = &work;
-    std::thread::scope(|scope| {
-        for (i, part) in parts.into_iter().enumerate() {
-            scope.spawn(move || work(i, part));
-        }
-    });
-}

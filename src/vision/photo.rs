@@ -131,6 +131,9 @@ pub fn decode(bytes: &[u8], limits: &Limits) -> Result<Photo, VisionError> {
 /// The decoded picture, upright, in the file's own kind of pixels, and the camera's focal length.
 pub(crate) fn decode_dynamic(bytes: &[u8], limits: &Limits) -> Result<(DynamicImage, Option<f64>), VisionError> {
     let format = format_of(bytes)?;
+    if !cfg!(feature = "codecs") {
+        return Err(VisionError::NoCodecs);
+    }
     // A PNG begins with its size; a decoder may stumble over an absurd one before it tells.
     if let (ImageFormat::Png, Some(&[w0, w1, w2, w3, h0, h1, h2, h3])) = (format, bytes.get(16..24)) {
         limits.check(u32::from_be_bytes([w0, w1, w2, w3]), u32::from_be_bytes([h0, h1, h2, h3]))?;

@@ -94,7 +94,7 @@ fn point(targets: &[Target], here: &[Vec<f64>], there: &[Vec<f64>], angle: f64) 
 }
 
 fn not_gaussian(trace: &Trace, t: Target) -> Box<RunError> {
-    let name = trace.dist(t).map_or("unknown", |d| d.name());
+    let name = trace.dist(t).map_or("unknown".to_owned(), |d| d.name().to_owned());
     Box::new(RunError {
         kind: FaultKind::Type,
         message: format!("elliptical: the prior of {} is {name}, not Gaussian", trace.address(t)),

@@ -10,11 +10,11 @@ use crate::infer::kernel::{At, Kernel, Outcome, accepts, recoverable};
 use crate::infer::selection::{address, fail};
 use crate::lang::code::Code;
 use crate::lang::value::Value;
+use crate::platform::clock::Instant;
 use crate::rng::{Purpose, Stream, StreamKey};
 use crate::syntax::ast::{Expr, ExprKind, KStmt, KStmtKind, KernelDecl};
 use crate::trace::{Address, Change, Draws, Target, Trace, TraceResult};
 use std::sync::Arc;
-use std::time::Instant;
 
 /// A kernel of the program, with its arguments.
 #[derive(Clone, Debug)]

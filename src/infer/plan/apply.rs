@@ -9,11 +9,11 @@ use crate::infer::kernel::{At, Outcome};
 use crate::infer::kernels::own::proposes;
 use crate::infer::selection::fail;
 use crate::lang::value::Value;
+use crate::platform::clock::Instant;
 use crate::rng::{Purpose, StreamKey};
 use crate::syntax::ast::{Arg, Expr, ExprKind, KernelDecl, MixArm};
 use smallvec::SmallVec;
 use std::sync::atomic::Ordering;
-use std::time::Instant;
 
 /// The most kernels of a chain: arguments that change without end would fill the memory.
 const MOST: usize = 10_000;
@@ -110,6 +110,9 @@ impl Runner<'_> {
         }
         self.step += 1;
         self.progress.steps.fetch_add(1, Ordering::Relaxed);
+        if let Some(watch) = &self.options.watch {
+            watch.step(self.chain, self.step, &self.trace);
+        }
         Ok(outcome)
     }
 

@@ -11,11 +11,12 @@ use crate::infer::plain::Plain;
 use crate::infer::population::Population;
 use crate::infer::state::{StateError, holds, pack, unpack};
 use crate::lang::code::Code;
+use crate::platform::clock::Instant;
 use crate::syntax::ast::KStmt;
 use crate::trace::{Constraint, Draws, Selector, Trace};
 use serde::{Deserialize, Serialize};
 use std::sync::Arc;
-use std::time::{Duration, Instant};
+use std::time::Duration;
 
 type State = Vec<(u64, Constraint)>;
 

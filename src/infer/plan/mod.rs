@@ -16,13 +16,14 @@ use super::population::Population;
 use super::state::StateError;
 use crate::lang::code::Code;
 use crate::lang::error::RunError;
+use crate::platform::clock::Instant;
 use crate::syntax::ast::{Expr, ExprKind, KStmt};
 use crate::trace::{Constraint, Draws, Limits, Trace};
 use runner::Runner;
 use std::fmt;
 use std::sync::Arc;
 use std::sync::atomic::{AtomicBool, AtomicU64};
-use std::time::{Duration, Instant};
+use std::time::Duration;
 
 /// Bounds and settings of a run.
 #[derive(Clone, Debug)]
@@ -63,7 +64,7 @@ impl Default for RunOptions {
     }
 }
 
-/// Looks at the state of a chain whenever a draw is recorded.
+/// Looks at the state of a chain whenever a draw is recorded, and at steps. [`Observer`](super::Observer) is one made of closures.
 pub trait Watch: fmt::Debug + Send + Sync {
     /// A draw of a chain has been recorded, and this is its state. What it asks for and no observation does is drawn from
     /// `draws`. It leaves the state as it is, unless it is there to change it ([`super::calibration::geweke()`]): the chain goes on
@@ -83,6 +84,16 @@ pub trait Watch: fmt::Debug + Send + Sync {
     fn load(&self, chain: u32, state: &[u8]) -> Result<(), StateError> {
         let _ = chain;
         if state.is_empty() { Ok(()) } else { Err(StateError::new("another watch gathered this")) }
+    }
+
+    /// A chain has made so many steps, and this is its state.
+    fn step(&self, chain: u32, steps: u64, trace: &Trace) {
+        let _ = (chain, steps, trace);
+    }
+
+    /// Asked between steps: whether the run is to end, all chains of it.
+    fn is_over(&self) -> bool {
+        false
     }
 }
 

@@ -15,6 +15,7 @@ use crate::infer::state::StateError;
 use crate::lang::code::Code;
 use crate::lang::error::RunError;
 use crate::lang::value::Value;
+use crate::platform::clock::Instant;
 use crate::rng::{Purpose, StreamKey};
 use crate::syntax::ast::{Expr, KStmt, KStmtKind};
 use crate::trace::{Constraint, Draws, Selector, Trace};
@@ -22,7 +23,6 @@ use rustc_hash::FxHashMap;
 use std::collections::VecDeque;
 use std::sync::Arc;
 use std::sync::atomic::Ordering;
-use std::time::Instant;
 
 /// How a statement ended.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
@@ -351,7 +351,7 @@ impl<'a> Runner<'a> {
     }
 
     pub fn is_cancelled(&self) -> bool {
-        self.progress.cancelled.load(Ordering::Relaxed)
+        self.progress.cancelled.load(Ordering::Relaxed) || self.options.watch.as_ref().is_some_and(|w| w.is_over())
     }
 
     /// Whether the run, or the warm-up, has used up what it was given.

@@ -24,8 +24,10 @@ type Numbers<'a> = Cow<'a, [f64]>;
 impl<'a> Args<'a> {
     /// Argument `i`.
     pub fn get(&self, i: usize) -> &'a Value {
-        const NOTHING: &Value = &Value::Unit;
-        self.values.get(i).copied().unwrap_or(NOTHING)
+        match self.values.get(i) {
+            Some(v) if !matches!(v, Value::Unit) => v,
+            _ => self.builtin.args.get(i).map_or(&Value::Unit, |a| &a.value),
+        }
     }
 
     /// Whether argument `i` was given.
@@ -33,8 +35,8 @@ impl<'a> Args<'a> {
         !matches!(self.get(i), Value::Unit)
     }
 
-    fn name(&self, i: usize) -> &'static str {
-        self.builtin.args.get(i).or(self.builtin.args.last()).map_or("argument", |a| a.name)
+    fn name(&self, i: usize) -> &'a str {
+        self.builtin.args.get(i).or(self.builtin.args.last()).map_or("argument", |a| &a.name)
     }
 
     /// The error that argument `i` is not what was wanted.
@@ -171,6 +173,7 @@ impl<'a> Args<'a> {
     }
 
     /// The error that an array would be too long.
+    #[doc(hidden)]
     pub fn too_many(&self, n: f64) -> Fault {
         let message = format!("{}: an array of {n} elements is too long", self.builtin.full_name());
         Fault::new(FaultKind::Limit, message).with_hint(format!("at most {MAX_ELEMENTS} are made in one go"))

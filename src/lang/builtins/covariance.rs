@@ -1,6 +1,6 @@
 //! Covariance functions of Gaussian processes, as values: `sq_exp(0.5) + white(0.01)`.
 
-use super::{Arg, Args, Builtin, Pulled, Type, arg, function, opt};
+use super::{Arg, Args, Pulled, Row, Type, arg, function, opt};
 use crate::dist::{Covariance, ParamError};
 use crate::lang::adjoint::Adjoint;
 use crate::lang::error::Fault;
@@ -56,11 +56,11 @@ const fn covariance(
     args: &'static [Arg],
     doc: &'static str,
     f: fn(&Args) -> Result<Value, Fault>,
-) -> Builtin {
+) -> Row {
     function(name, SECTION, args, Type::Covariance, doc, f).pull(pull_params)
 }
 
-pub(super) const TABLE: &[Builtin] = &[
+pub(super) const TABLE: &[Row] = &[
     covariance(
         "sq_exp",
         &[LENGTH, SD],

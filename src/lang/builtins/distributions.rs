@@ -6,7 +6,7 @@
 use super::covariance::CovarianceValue;
 use super::elementwise::array_len;
 use super::matrix::Matrix;
-use super::{Arg, Args, Builtin, Kind, Scalar, Type, arg, opt};
+use super::{Arg, Args, Kind, Row, Scalar, Type, arg, opt};
 use crate::dist::{self, Dist, FAMILIES, Family, ParamError};
 use crate::lang::error::Fault;
 use crate::lang::value::Value;
@@ -36,11 +36,11 @@ macro_rules! scalar {
 }
 
 /// The row of any other family.
-const fn other(name: &'static str, args: &'static [Arg], make: fn(&Args) -> Result<Dist, Fault>) -> Builtin {
-    Builtin::new(Kind::Distribution(make), name, SECTION, args, Type::Dist, family(name).doc)
+const fn other(name: &'static str, args: &'static [Arg], make: fn(&Args) -> Result<Dist, Fault>) -> Row {
+    Row::new(Kind::Distribution(make), name, SECTION, args, Type::Dist, family(name).doc)
 }
 
-pub(super) const TABLE: &[Builtin] = &[
+pub(super) const TABLE: &[Row] = &[
     scalar!("normal", [mean, sd], dist::Normal::new(mean, sd).map(Dist::Normal)),
     scalar!("lognormal", [mu, sigma], dist::LogNormal::new(mu, sigma).map(Dist::LogNormal)),
     scalar!("uniform", [lo, hi], dist::Uniform::new(lo, hi).map(Dist::Uniform)),
@@ -280,7 +280,7 @@ fn mixture(a: &Args) -> Result<Dist, Fault> {
 fn square(a: &Args, i: usize, n: usize) -> Result<nalgebra::DMatrix<f64>, Fault> {
     let m = Matrix::read(a, i)?;
     if m.rows.len() != n || m.width != n {
-        let (name, rows, columns) = (a.builtin.args[i].name, m.rows.len(), m.width);
+        let (name, rows, columns) = (&a.builtin.args[i].name, m.rows.len(), m.width);
         return Err(Fault::type_error(format!(
             "mv_normal: `{name}` must be {n} x {n} like the mean, got {rows} x {columns}"
         )));

@@ -1,6 +1,6 @@
 //! The language reference, made from the table of built-ins: one entry for `pcadlang doc`, and the whole as Markdown.
 
-use super::{Arg, Builtin, Kind, Table, Type};
+use super::{Argument, Builtin, Kind, Table, Type};
 use std::fmt::Write;
 
 /// The entry of a built-in or constant as plain text: `normal`, `scene.lathe`, or `lathe` where that is clear.
@@ -28,7 +28,7 @@ fn entry(b: &Builtin) -> String {
         s.push('\n');
     }
     let width = b.args.iter().map(|a| a.name.len()).max().unwrap_or(0);
-    for a in b.args {
+    for a in b.args.iter() {
         let _ = writeln!(s, "  {:width$}  {} {}", a.name, traits(a), a.doc);
     }
     for (what, text) in notes(b) {
@@ -46,8 +46,8 @@ pub fn reference(table: &Table) -> String {
     }
     let mut sections: Vec<&str> = Vec::new();
     for b in table.iter() {
-        if !sections.contains(&b.section) {
-            sections.push(b.section);
+        if !sections.contains(&&*b.section) {
+            sections.push(&b.section);
         }
     }
     for section in sections {
@@ -58,7 +58,7 @@ pub fn reference(table: &Table) -> String {
                 let _ = write!(s, " → {what}");
             }
             let _ = writeln!(s, ". {}", b.doc);
-            for a in b.args {
+            for a in b.args.iter() {
                 let _ = writeln!(s, "  - `{}`: {} {}", a.name, traits(a), a.doc);
             }
             for (what, text) in notes(b) {
@@ -78,12 +78,12 @@ fn gives(b: &Builtin) -> Option<String> {
 }
 
 /// Type, unit and default of an argument, as "number, radians, default 0."
-fn traits(a: &Arg) -> String {
+fn traits(a: &Argument) -> String {
     let mut s = a.ty.to_string();
     if !a.unit.is_empty() {
         let _ = write!(s, ", {}", a.unit);
     }
-    if let Some(d) = a.default {
+    if let Some(d) = &a.default {
         let _ = write!(s, ", default {d}");
     }
     s.push('.');
@@ -97,7 +97,7 @@ fn notes(b: &Builtin) -> Vec<(&'static str, String)> {
         notes.push(("Not available yet", "checked, but a run that reaches it ends with an error.".to_owned()));
     }
     if matches!(b.kind, Kind::Distribution(_)) {
-        notes.extend(super::distributions::notes(b.name));
+        notes.extend(super::distributions::notes(&b.name));
     }
     notes
 }

@@ -1,14 +1,14 @@
 //! Forms: built-ins that are lowered to operations of their own, because they call functions or look at the whole trace.
 
-use super::{Arg, Builtin, Form, Kind, Type, arg};
+use super::{Arg, Form, Kind, Row, Type, arg};
 
 const SECTION: &str = "Forms";
 
-const fn form(name: &'static str, args: &'static [Arg], returns: Type, doc: &'static str, form: Form) -> Builtin {
-    Builtin::new(Kind::Form(form), name, SECTION, args, returns, doc)
+const fn form(name: &'static str, args: &'static [Arg], returns: Type, doc: &'static str, form: Form) -> Row {
+    Row::new(Kind::Form(form), name, SECTION, args, returns, doc)
 }
 
-pub(super) const TABLE: &[Builtin] = &[
+pub(super) const TABLE: &[Row] = &[
     form(
         "map",
         &[

@@ -3,7 +3,7 @@
 //! This is their documentation and their arguments; what they do is the business of the engine. They are not values of
 //! the model.
 
-use super::{Arg, Builtin, Kind, Type, arg, opt};
+use super::{Arg, Kind, Row, Type, arg, opt};
 
 const KERNELS: &str = "Kernels";
 const CHOICES: &str = "Selections and starts";
@@ -18,8 +18,8 @@ const fn name(
     args: &'static [Arg],
     returns: Type,
     doc: &'static str,
-) -> Builtin {
-    Builtin::new(Kind::Inference, name, section, args, returns, doc)
+) -> Row {
+    Row::new(Kind::Inference, name, section, args, returns, doc)
 }
 
 const SEL: Arg = arg("sel", Type::Selection, "The choices it moves.");
@@ -33,7 +33,7 @@ const MARGINAL: Arg = opt(
 const INNER: Arg = arg("move", Type::Kernel, "The kernel inside.");
 const X: Arg = arg("x", Type::Any, "A number of the model, as in `collect`.");
 
-pub(super) const TABLE: &[Builtin] = &[
+pub(super) const TABLE: &[Row] = &[
     name(
         "mh",
         KERNELS,

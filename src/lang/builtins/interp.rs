@@ -1,12 +1,12 @@
 //! Linear interpolation of tables.
 
-use super::{Args, Builtin, Pulled, Type, arg, function};
+use super::{Args, Pulled, Row, Type, arg, function};
 use crate::lang::adjoint::Adjoint;
 use crate::lang::error::Fault;
 use crate::lang::value::Value;
 use smallvec::smallvec;
 
-pub(super) const TABLE: &[Builtin] = &[function(
+pub(super) const TABLE: &[Row] = &[function(
     "interp",
     "Arrays and records",
     &[

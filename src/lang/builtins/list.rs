@@ -1,7 +1,7 @@
 //! Making, joining and searching arrays and records; truth tests over arrays; strings.
 
 use super::elementwise::{array, array_len, common_len, part};
-use super::{Arg, Args, Builtin, Pulled, Type, arg, function, opt};
+use super::{Arg, Args, Pulled, Row, Type, arg, function, opt};
 use crate::lang::adjoint::Adjoint;
 use crate::lang::error::{Fault, FaultKind};
 use crate::lang::key::Key;
@@ -17,7 +17,7 @@ const N: &[Arg] = &[arg("n", Type::Int, "The number of elements.")];
 const BOOLS: &[Arg] = &[arg("xs", Type::Array, "Bools.")];
 const FIELDS: &[Arg] = &[arg("r", Type::Any, "A record, or an array whose keys are its positions.")];
 
-pub(super) const TABLE: &[Builtin] = &[
+pub(super) const TABLE: &[Row] = &[
     function(
         "len",
         SECTION,

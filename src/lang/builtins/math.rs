@@ -3,7 +3,7 @@
 use super::derivative::{of_pairs, one_of};
 use super::elementwise::{mapped, numeric};
 use super::reduce::{largest, smallest};
-use super::{Arg, Args, Builtin, Derivative, Pulled, Scalar, Type, arg, function};
+use super::{Arg, Args, Derivative, Pulled, Row, Scalar, Type, arg, function};
 use crate::lang::adjoint::Adjoint;
 use crate::lang::error::Fault;
 use crate::lang::value::Value;
@@ -26,11 +26,11 @@ macro_rules! smooth {
 }
 
 /// Constant between jumps.
-const fn steps(name: &'static str, doc: &'static str, f: fn(f64) -> f64) -> Builtin {
+const fn steps(name: &'static str, doc: &'static str, f: fn(f64) -> f64) -> Row {
     function(name, SECTION, X, Type::Nums, doc, mapped).scalar(Scalar::Unary(f)).flat()
 }
 
-pub(super) const TABLE: &[Builtin] = &[
+pub(super) const TABLE: &[Row] = &[
     smooth!("exp", X, "The exponential.", libm::exp, |_, y| y),
     smooth!("expm1", X, "`exp(x) - 1`, accurate near 0.", libm::expm1, |_, y| y + 1.0),
     smooth!("log", X, "The natural logarithm; -inf at 0, NaN below.", libm::log, |x, _| 1.0 / x),

@@ -4,7 +4,7 @@
 
 use super::elementwise::array;
 use super::reduce::dot;
-use super::{Args, Builtin, Pulled, Type, arg, function};
+use super::{Args, Pulled, Row, Type, arg, function};
 use crate::lang::adjoint::Adjoint;
 use crate::lang::error::Fault;
 use crate::lang::value::Value;
@@ -13,7 +13,7 @@ use std::borrow::Cow;
 
 const SECTION: &str = "Matrices";
 
-pub(super) const TABLE: &[Builtin] = &[
+pub(super) const TABLE: &[Row] = &[
     function(
         "matmul",
         SECTION,

@@ -10,6 +10,7 @@ mod derivative;
 mod distributions;
 pub mod doc;
 mod elementwise;
+mod foreign;
 mod forms;
 mod inference;
 mod interp;
@@ -18,6 +19,7 @@ mod math;
 mod matrix;
 mod operators;
 mod reduce;
+mod row;
 pub mod scene;
 mod table;
 
@@ -25,15 +27,21 @@ pub use args::Args;
 pub use covariance::CovarianceValue;
 pub(crate) use derivative::times;
 pub use derivative::{Binary, Derivative, Pull, Pulled, Reduction};
+pub use foreign::{Before, Foreign, State};
 pub(crate) use reduce::dot;
+use row::{Arg, Row, arg, function, opt};
 pub use table::{Constant, Table};
 
 use super::error::Fault;
 use super::value::Value;
 use crate::dist::Dist;
 use smallvec::SmallVec;
+use std::borrow::Cow;
 use std::fmt;
 use std::sync::Arc;
+
+/// A name or text: the language's own, or one that a host made.
+pub type Text = Cow<'static, str>;
 
 /// The type of an argument or result, as far as it can be told before a run.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
@@ -93,35 +101,20 @@ impl fmt::Display for Type {
 }
 
 /// One argument.
-#[derive(Clone, Copy, Debug)]
-pub struct Arg {
+#[derive(Clone, Debug)]
+pub struct Argument {
     /// Its name, usable as a keyword.
-    pub name: &'static str,
+    pub name: Text,
     /// Its type.
     pub ty: Type,
     /// Its unit, or nothing.
-    pub unit: &'static str,
+    pub unit: Text,
     /// How its default is written; `None` if it must be given.
-    pub default: Option<&'static str>,
+    pub default: Option<Text>,
+    /// What a call that leaves it out gets; nothing where the function itself knows.
+    pub value: Value,
     /// One line about it.
-    pub doc: &'static str,
-}
-
-/// An argument that must be given.
-pub const fn arg(name: &'static str, ty: Type, doc: &'static str) -> Arg {
-    Arg { name, ty, unit: "", default: None, doc }
-}
-
-/// An argument with a default.
-pub const fn opt(name: &'static str, ty: Type, default: &'static str, doc: &'static str) -> Arg {
-    Arg { name, ty, unit: "", default: Some(default), doc }
-}
-
-impl Arg {
-    /// The same with a unit.
-    pub const fn unit(self, unit: &'static str) -> Arg {
-        Arg { unit, ..self }
-    }
+    pub doc: Text,
 }
 
 /// Forms: built-ins that are lowered to operations of their own.
@@ -178,40 +171,30 @@ pub enum Scalar {
 }
 
 /// One built-in.
-#[derive(Clone, Copy)]
+#[derive(Clone)]
 pub struct Builtin {
     /// Its name.
-    pub name: &'static str,
+    pub name: Text,
     /// The namespace it belongs to: nothing for the language itself, `scene` for `std/scene.pcad`.
-    pub module: &'static str,
+    pub module: Text,
     /// The heading it stands under in the reference.
-    pub section: &'static str,
+    pub section: Text,
     /// Its arguments in order.
-    pub args: &'static [Arg],
+    pub args: Arc<[Argument]>,
     /// Whether the last argument may be given any number of times.
     pub variadic: bool,
     /// What it gives.
     pub returns: Type,
     /// One line about it.
-    pub doc: &'static str,
+    pub doc: Text,
     /// What it is.
     pub kind: Kind,
     /// What it is on single numbers.
     pub scalar: Option<Scalar>,
     /// Its derivative.
     pub derivative: Derivative,
-}
-
-/// A pure function of the language's own namespace.
-const fn function(
-    name: &'static str,
-    section: &'static str,
-    args: &'static [Arg],
-    returns: Type,
-    doc: &'static str,
-    f: fn(&Args) -> Result<Value, Fault>,
-) -> Builtin {
-    Builtin::new(Kind::Function(f), name, section, args, returns, doc)
+    /// What stands behind it, where that is a host's and not the language's own.
+    pub foreign: Option<Foreign>,
 }
 
 impl fmt::Debug for Builtin {
@@ -221,44 +204,6 @@ impl fmt::Debug for Builtin {
 }
 
 impl Builtin {
-    /// One of the language's own namespace, of which no derivative is known.
-    const fn new(
-        kind: Kind,
-        name: &'static str,
-        section: &'static str,
-        args: &'static [Arg],
-        returns: Type,
-        doc: &'static str,
-    ) -> Builtin {
-        let derivative = Derivative::Unknown;
-        Builtin { name, module: "", section, args, variadic: false, returns, doc, kind, scalar: None, derivative }
-    }
-
-    /// The same, known to be this on single numbers.
-    const fn scalar(self, f: Scalar) -> Builtin {
-        Builtin { scalar: Some(f), ..self }
-    }
-
-    /// The same with a last argument that may be given any number of times.
-    const fn variadic(self) -> Builtin {
-        Builtin { variadic: true, ..self }
-    }
-
-    /// The same with its vector-Jacobian product.
-    const fn pull(self, f: Pull) -> Builtin {
-        Builtin { derivative: Derivative::Product(f), ..self }
-    }
-
-    /// The same with a derivative.
-    const fn derivative(self, derivative: Derivative) -> Builtin {
-        Builtin { derivative, ..self }
-    }
-
-    /// The same, with a derivative of zero wherever there is one.
-    const fn flat(self) -> Builtin {
-        Builtin { derivative: Derivative::Zero, ..self }
-    }
-
     /// Calls it with values, one for each argument.
     ///
     /// # Errors
@@ -276,12 +221,12 @@ impl Builtin {
 
     /// Whether this version only checks and documents it, and cannot run it yet.
     pub fn is_planned(&self) -> bool {
-        matches!(self.kind, Kind::Inference) && inference::PLANNED.contains(&self.name)
+        matches!(self.kind, Kind::Inference) && self.foreign.is_none() && inference::PLANNED.contains(&&*self.name)
     }
 
     /// Its name as a program writes it: `normal`, `scene.lathe`.
     pub fn full_name(&self) -> String {
-        if self.module.is_empty() { self.name.to_owned() } else { format!("{}.{}", self.module, self.name) }
+        if self.module.is_empty() { self.name.clone().into_owned() } else { format!("{}.{}", self.module, self.name) }
     }
 
     /// `name(a, b = default)`, as the reference shows it.
@@ -292,8 +237,8 @@ impl Builtin {
             if i > 0 {
                 s.push_str(", ");
             }
-            s.push_str(a.name);
-            if let Some(d) = a.default {
+            s.push_str(&a.name);
+            if let Some(d) = &a.default {
                 s.push_str(" = ");
                 s.push_str(d);
             }
@@ -348,10 +293,10 @@ impl Builtin {
     }
 
     fn no_such_argument(&self, keyword: &str) -> String {
-        let hint = match crate::diag::nearest(keyword, self.args.iter().map(|a| a.name)) {
+        let hint = match crate::diag::nearest(keyword, self.args.iter().map(|a| &*a.name)) {
             Some(near) => format!("; did you mean `{near}`?"),
             None if self.args.is_empty() => "; it takes none".to_owned(),
-            None => format!("; it takes {}", self.args.iter().map(|a| a.name).collect::<Vec<_>>().join(", ")),
+            None => format!("; it takes {}", self.args.iter().map(|a| &*a.name).collect::<Vec<_>>().join(", ")),
         };
         format!("`{}` has no argument `{keyword}`{hint}", self.full_name())
     }

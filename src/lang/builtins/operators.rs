@@ -7,7 +7,7 @@ use super::covariance::CovarianceValue;
 use super::derivative::of_pairs;
 use super::elementwise::{self, array, array_len, broadcast, mapped, numeric};
 use super::math::pow_slopes;
-use super::{Arg, Args, Builtin, Derivative, Scalar, Type, arg, function};
+use super::{Arg, Args, Derivative, Row, Scalar, Type, arg, function};
 use crate::lang::error::Fault;
 use crate::lang::value::Value;
 use std::cmp::Ordering;
@@ -16,7 +16,7 @@ const SECTION: &str = "Operators";
 
 const SIDES: &[Arg] = &[arg("a", Type::Any, "The left side."), arg("b", Type::Any, "The right side.")];
 
-const fn infix(name: &'static str, returns: Type, doc: &'static str, f: fn(&Args) -> Result<Value, Fault>) -> Builtin {
+const fn infix(name: &'static str, returns: Type, doc: &'static str, f: fn(&Args) -> Result<Value, Fault>) -> Row {
     function(name, SECTION, SIDES, returns, doc, f)
 }
 
@@ -27,7 +27,7 @@ macro_rules! arithmetic {
     };
 }
 
-pub(super) const TABLE: &[Builtin] = &[
+pub(super) const TABLE: &[Row] = &[
     of_pairs!(
         infix("+", Type::Any, "Sum of numbers, element by element; joins two strings; adds covariances.", add),
         |x, y| x + y,
@@ -207,7 +207,7 @@ const EXACT: f64 = 9_007_199_254_740_992.0;
 
 /// The error that an operator is not defined for what stands at its sides.
 fn unsuited(a: &Args, wanted: &str, x: &Value, y: &Value) -> Fault {
-    let name = a.builtin.name;
+    let name = &a.builtin.name;
     let fault = Fault::type_error(format!("`{name}` needs {wanted}, got {} and {}", x.type_name(), y.type_name()));
     match (x, y) {
         (Value::Str(_), Value::Num(_)) | (Value::Num(_), Value::Str(_)) if name == "+" => {

@@ -2,7 +2,7 @@
 
 use super::derivative::{Reduction, times};
 use super::math::{larger, smaller};
-use super::{Arg, Builtin, Derivative, Type, arg, function};
+use super::{Arg, Derivative, Row, Type, arg, function};
 use crate::lang::adjoint::Adjoint;
 use crate::lang::value::Value;
 use smallvec::smallvec;
@@ -23,7 +23,7 @@ macro_rules! of_all {
     };
 }
 
-pub(super) const TABLE: &[Builtin] = &[
+pub(super) const TABLE: &[Row] = &[
     of_all!("sum", 0, "The sum; 0 of nothing.", sum, |_, _, by| by.fill(1.0)),
     of_all!("prod", 0, "The product; 1 of nothing.", |xs| xs.iter().product(), |xs, _, by| {
         let others = |i: usize| xs.iter().enumerate().filter(|(j, _)| *j != i).map(|(_, x)| x).product();

@@ -3,9 +3,10 @@
 //! Not a scope: shadowing by a program's own names is the business of lowering.
 
 use super::{
-    Builtin, covariance, data, distributions, forms, inference, interp, list, math, matrix, operators, reduce, scene,
+    Builtin, Row, Text, covariance, data, distributions, forms, inference, interp, list, math, matrix, operators,
+    reduce, scene,
 };
-use indexmap::IndexMap;
+use indexmap::{Equivalent, IndexMap};
 use rustc_hash::FxBuildHasher;
 
 /// A name with a fixed value.
@@ -26,7 +27,7 @@ const CONSTANTS: &[Constant] = &[
 
 /// Those of the language, in the order of the reference.
 pub(super) fn all() -> impl Iterator<Item = Builtin> {
-    let own = [
+    let own: [&[Row]; 11] = [
         operators::TABLE,
         math::TABLE,
         reduce::TABLE,
@@ -39,13 +40,27 @@ pub(super) fn all() -> impl Iterator<Item = Builtin> {
         data::TABLE,
         inference::TABLE,
     ];
-    own.into_iter().flatten().copied().chain(scene::all())
+    own.into_iter().flatten().chain(scene::all()).map(Builtin::from)
+}
+
+/// The module and name of a built-in.
+#[derive(Clone, Debug, Hash, PartialEq, Eq)]
+struct FullName(Text, Text);
+
+/// The same, borrowed, to look one up.
+#[derive(Hash)]
+struct Sought<'a>(&'a str, &'a str);
+
+impl Equivalent<FullName> for Sought<'_> {
+    fn equivalent(&self, name: &FullName) -> bool {
+        self.0 == name.0 && self.1 == name.1
+    }
 }
 
 /// The built-ins a program sees, by index and by name.
 #[derive(Clone, Debug)]
 pub struct Table {
-    entries: IndexMap<(&'static str, &'static str), Builtin, FxBuildHasher>,
+    entries: IndexMap<FullName, Builtin, FxBuildHasher>,
 }
 
 impl Default for Table {
@@ -58,7 +73,7 @@ impl Table {
     /// The built-ins of the language and these; one of the same module and name replaces the language's own.
     pub fn new(more: impl IntoIterator<Item = Builtin>) -> Self {
         let all = all().chain(more);
-        Table { entries: all.map(|b| ((b.module, b.name), b)).collect() }
+        Table { entries: all.map(|b| (FullName(b.module.clone(), b.name.clone()), b)).collect() }
     }
 
     /// The built-in at an index that [`find`](Table::find) gave.
@@ -68,7 +83,7 @@ impl Table {
 
     /// The index of a built-in; operators are named as they are written, with `neg` and `not` for the prefix ones.
     pub fn find(&self, module: &str, name: &str) -> Option<u32> {
-        self.entries.get_index_of(&(module, name)).map(|i| i as u32)
+        self.entries.get_index_of(&Sought(module, name)).map(|i| i as u32)
     }
 
     /// All of them, in the order of the reference.

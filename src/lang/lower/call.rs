@@ -22,7 +22,8 @@ impl Lowerer<'_> {
     pub fn call(&mut self, e: &Expr, callee: &Expr, args: &[Arg], name: Option<&Arc<str>>) -> Typed {
         match self.target(callee) {
             Target::Builtin(i) => {
-                let b = *self.code.builtins.get(i);
+                let table = Arc::clone(&self.code.builtins);
+                let b = table.get(i);
                 match b.kind {
                     Kind::Form(form) => self.form(form, i, args, e.span, name),
                     Kind::Function(_) | Kind::Distribution(_) => match self.builtin_args(i, args, e.span) {
@@ -30,7 +31,7 @@ impl Lowerer<'_> {
                         None => self.nothing(),
                     },
                     Kind::Inference => {
-                        self.only_in_plans(b.name, callee.span);
+                        self.only_in_plans(&b.name, callee.span);
                         self.nothing()
                     }
                 }
@@ -150,11 +151,12 @@ impl Lowerer<'_> {
 
     /// The arguments of a built-in in the table's order.
     pub fn builtin_args(&mut self, i: u32, args: &[Arg], span: Span) -> Option<Box<[Operand]>> {
-        let b = *self.code.builtins.get(i);
+        let table = Arc::clone(&self.code.builtins);
+        let b = table.get(i);
         let order = match b.match_names(args.iter().map(|a| a.name.as_ref().map(|n| &*n.node))) {
             Ok(order) => order,
             Err(message) => {
-                self.mismatch(&b, message, args, span);
+                self.mismatch(b, message, args, span);
                 self.written(args);
                 return None;
             }
@@ -180,7 +182,7 @@ impl Lowerer<'_> {
                 }
                 None => {
                     let full: &str = &b.full_name();
-                    let given = self.inputs.defaults.iter().find(|((f, a), _)| *f == full && *a == arg.name);
+                    let given = self.inputs.defaults.iter().find(|((f, a), _)| f == full && *a == *arg.name);
                     let value = given.map_or(Value::Unit, |(_, v)| v.clone());
                     operands.push(self.constant(value).at);
                 }
@@ -197,11 +199,12 @@ impl Lowerer<'_> {
     }
 
     fn form(&mut self, form: Form, i: u32, args: &[Arg], span: Span, name: Option<&Arc<str>>) -> Typed {
-        let b = *self.code.builtins.get(i);
+        let table = Arc::clone(&self.code.builtins);
+        let b = table.get(i);
         let order = match b.match_names(args.iter().map(|a| a.name.as_ref().map(|n| &*n.node))) {
             Ok(order) => order,
             Err(message) => {
-                self.mismatch(&b, message, args, span);
+                self.mismatch(b, message, args, span);
                 self.written(args);
                 return self.nothing();
             }

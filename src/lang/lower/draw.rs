@@ -24,7 +24,9 @@ impl Lowerer<'_> {
     /// What a family draws, where it can be told.
     fn drawn_type(&self, d: &DistSpec) -> Type {
         match d {
-            DistSpec::Family { builtin, args } => match self.code.builtins.get(*builtin).name {
+            // What a host's family draws only the host knows.
+            DistSpec::Family { builtin, .. } if self.code.builtins.get(*builtin).foreign.is_some() => Type::Any,
+            DistSpec::Family { builtin, args } => match &*self.code.builtins.get(*builtin).name {
                 "flip" => Type::Any,
                 "dirichlet" | "mv_normal" | "gp" | "multinomial" | "lkj" | "wishart" | "ordered" => Type::Array,
                 "iid" | "mixture" => Type::Any,

@@ -48,7 +48,7 @@ impl Lowerer<'_> {
             .iter()
             .filter(|b| b.module.is_empty() && b.name.starts_with(|c: char| c.is_alphabetic()))
             .filter(|b| !matches!(b.kind, Kind::Inference))
-            .map(|b| b.name);
+            .map(|b| &*b.name);
         let near = nearest(name, visible.iter().map(|n| &**n).chain(known)).map(str::to_owned);
         // A name of a namespace, written without it.
         let inside = self.modules[self.module].namespaces.iter().find_map(|(ns, space)| {
@@ -123,7 +123,7 @@ impl Lowerer<'_> {
         let m = &self.modules[module];
         let native = m.native.clone();
         let own = m.names.keys().cloned().collect::<Vec<_>>();
-        let natives = table.iter().filter(|b| native.as_deref() == Some(b.module)).map(|b| b.name);
+        let natives = table.iter().filter(|b| native.as_deref() == Some(&*b.module)).map(|b| &*b.name);
         let known: Vec<&str> = own.iter().map(|n| &**n).chain(natives).collect();
         let hint = match nearest(&field.node, known.iter().copied()) {
             Some(n) => format!("did you mean `{ns}.{n}`?"),

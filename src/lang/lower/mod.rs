@@ -52,7 +52,7 @@ pub struct Inputs<'a> {
     /// Whether a `data` item without a value is an error; not when a program is only checked.
     pub needs_data: bool,
     /// Values for arguments left out: of a built-in by full name, an argument by name.
-    pub defaults: FxHashMap<(&'static str, &'static str), Value>,
+    pub defaults: FxHashMap<(String, String), Value>,
 }
 
 /// An inference block.

@@ -180,7 +180,8 @@ impl Lowerer<'_> {
             }
             return;
         }
-        match self.code.builtins.find("", name).map(|i| *self.code.builtins.get(i)) {
+        let table = Arc::clone(&self.code.builtins);
+        match table.find("", name).map(|i| table.get(i)) {
             Some(b) if matches!(b.kind, Kind::Inference) => {
                 if b.returns != Type::Kernel {
                     self.error(format!("`{name}` is no kernel"), callee.span, format!("it gives {}", shown(b.returns)));
@@ -194,7 +195,7 @@ impl Lowerer<'_> {
                     self.error("`anneal` belongs in a `warmup`", e.span, "draws are kept here")
                         .hint_also("the likelihood must be itself when draws are collected");
                 }
-                self.inference_args(&b, args, e.span, around);
+                self.inference_args(b, args, e.span, around);
             }
             found => {
                 let other = match found.map(|b| b.kind) {
@@ -202,11 +203,10 @@ impl Lowerer<'_> {
                     Some(_) => Some("a function"),
                     None => self.modules[0].names.contains_key(name).then_some("a name of the model"),
                 };
-                let table = Arc::clone(&self.code.builtins);
                 let known = table
                     .iter()
                     .filter(|b| matches!(b.kind, Kind::Inference) && b.returns == Type::Kernel && b.name != "prior")
-                    .map(|b| b.name);
+                    .map(|b| &*b.name);
                 let own: Vec<Arc<str>> = self.kernels.keys().cloned().collect();
                 let near = crate::diag::nearest(name, known.chain(own.iter().map(|n| &**n))).map(str::to_owned);
                 let message = match other {
@@ -240,7 +240,7 @@ impl Lowerer<'_> {
             let value = &args[*j].value;
             match arg.ty {
                 Type::Selection => self.selection(value, &around.names.clone()),
-                Type::Kernel => self.kernel_or_start(b.name, value, around),
+                Type::Kernel => self.kernel_or_start(&b.name, value, around),
                 Type::Num | Type::Int | Type::Nums
                     if matches!(value.kind, ExprKind::Address(_) | ExprKind::TagSel { .. } | ExprKind::Str(_)) =>
                 {
@@ -270,8 +270,9 @@ impl Lowerer<'_> {
             {
                 let ExprKind::Var(n) = &callee.kind else { return };
                 if let Some(i) = self.code.builtins.find("", n) {
-                    let b = *self.code.builtins.get(i);
-                    self.inference_args(&b, args, e.span, around);
+                    let table = Arc::clone(&self.code.builtins);
+                    let b = table.get(i);
+                    self.inference_args(b, args, e.span, around);
                 }
             }
             _ => {
@@ -297,15 +298,16 @@ impl Lowerer<'_> {
             ExprKind::Record(fields) => fields.iter().for_each(|(_, x)| self.plan_expr(x, around)),
             ExprKind::Call { callee, args } => {
                 if let ExprKind::Var(name) = &callee.kind {
-                    let found = self.code.builtins.find("", name).map(|i| *self.code.builtins.get(i));
+                    let table = Arc::clone(&self.code.builtins);
+                    let found = table.find("", name).map(|i| table.get(i));
                     match found {
                         Some(b) if matches!(b.kind, Kind::Inference) => {
-                            return self.inference_args(&b, args, e.span, around);
+                            return self.inference_args(b, args, e.span, around);
                         }
                         Some(b) => {
                             if let Err(message) = b.match_names(args.iter().map(|a| a.name.as_ref().map(|n| &*n.node)))
                             {
-                                self.mismatch(&b, message, args, e.span);
+                                self.mismatch(b, message, args, e.span);
                             }
                         }
                         None if self.modules[0].names.contains_key(name) => {}
@@ -353,11 +355,12 @@ impl Lowerer<'_> {
             && let ExprKind::Var(name) = &callee.kind
             && let Some(i) = self.code.builtins.find("", name)
         {
-            let b = *self.code.builtins.get(i);
+            let table = Arc::clone(&self.code.builtins);
+            let b = table.get(i);
             if matches!(b.kind, Kind::Inference) {
                 match b.match_names(args.iter().map(|a| a.name.as_ref().map(|n| &*n.node))) {
                     Err(message) => {
-                        self.mismatch(&b, message, args, e.span);
+                        self.mismatch(b, message, args, e.span);
                     }
                     Ok(order) => {
                         for (p, j) in order.iter().enumerate() {

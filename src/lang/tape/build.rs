@@ -96,7 +96,7 @@ impl Builder {
             },
             (Derivative::Binary(f), [x, y]) if numeric(now) => self.binary(f, x, y, now),
             (Derivative::Reduction(f), [x]) => self.reduce(f, x),
-            _ if builtin.full_name() == "matmul" => self.matrix(&args),
+            _ if builtin.foreign.is_none() && builtin.full_name() == "matmul" => self.matrix(&args),
             _ => None,
         };
         if special.is_some() {
@@ -107,7 +107,7 @@ impl Builder {
         }
         if numeric(now) {
             let out = self.place(now)?;
-            self.ops.push(Op::Call { builtin: *builtin, args: args.into(), out: out.clone() });
+            self.ops.push(Op::Call { builtin: builtin.clone(), args: args.into(), out: out.clone(), before: None });
             return Some(out);
         }
         // What takes long to make is better made once.
@@ -117,7 +117,7 @@ impl Builder {
             Value::List(xs) => xs.iter().all(|x| matches!(x, Value::Bool(_) | Value::Dist(_))),
             _ => false,
         };
-        cheap.then(|| Form::Made(Arc::new(Made { builtin: *builtin, args: args.into() })))
+        cheap.then(|| Form::Made(Arc::new(Made { builtin: builtin.clone(), args: args.into() })))
     }
 
     fn unary(&mut self, f: fn(f64) -> f64, slope: fn(f64, f64) -> f64, x: &Form) -> Option<Form> {
@@ -259,7 +259,7 @@ impl Builder {
         }
         let dist = match args.iter().all(Form::is_fixed) {
             true => Form::Fixed(Value::Dist(Arc::new(dist.clone()))),
-            false => Form::Made(Arc::new(Made { builtin: *builtin, args: args.into() })),
+            false => Form::Made(Arc::new(Made { builtin: builtin.clone(), args: args.into() })),
         };
         self.score(dist, x.clone(), observed)
     }

@@ -2,7 +2,7 @@
 
 use crate::dist::Dist;
 use crate::lang::adjoint::Adjoint;
-use crate::lang::builtins::{Args, Builtin, Kind};
+use crate::lang::builtins::{Args, Before, Builtin, Kind};
 use crate::lang::density;
 use crate::lang::value::Value;
 use smallvec::SmallVec;
@@ -210,6 +210,24 @@ pub(super) fn call(builtin: &Builtin, args: &[Form], buffer: &[f64]) -> Option<(
     let values: SmallVec<[Value; 4]> = args.iter().map(|f| f.value(buffer)).collect::<Option<_>>()?;
     let value = builtin.apply(&values.iter().collect::<SmallVec<[&Value; 4]>>()).ok()?;
     Some((values, value))
+}
+
+/// The result of a call, of an incremental function from where it was in the last run.
+pub(super) fn call_from(
+    builtin: &Builtin,
+    args: &[Form],
+    buffer: &[f64],
+    before: &mut Option<Box<Before>>,
+) -> Option<Value> {
+    let values: SmallVec<[Value; 4]> = args.iter().map(|f| f.value(buffer)).collect::<Option<_>>()?;
+    let values: SmallVec<[&Value; 4]> = values.iter().collect();
+    match builtin.resume(&values, before.as_deref()) {
+        None => builtin.apply(&values).ok(),
+        Some(made) => {
+            let made = before.insert(Box::new(made.ok()?));
+            Some(made.value.clone())
+        }
+    }
 }
 
 /// Passes the adjoint of a call's result on to its arguments.

@@ -1,9 +1,9 @@
 //! The operations of a tape, forwards and backwards.
 
 use super::Sums;
-use super::form::{Form, call, pull_call};
+use super::form::{Form, call_from, pull_call};
 use crate::dist::{Batch, Dist};
-use crate::lang::builtins::{Binary, Builtin, Reduction, times};
+use crate::lang::builtins::{Before, Binary, Builtin, Reduction, times};
 use crate::lang::density;
 use crate::lang::value::Value;
 use crate::num::{Column, ExactSum};
@@ -23,7 +23,7 @@ pub(super) enum Op {
     /// Numbers from anywhere side by side.
     Gather { from: Box<[usize]>, out: usize },
     /// A call of any built-in whose result is of a form that lies in the buffer.
-    Call { builtin: Builtin, args: Box<[Form]>, out: Form },
+    Call { builtin: Builtin, args: Box<[Form]>, out: Form, before: Option<Box<Before>> },
     /// What must be as it was when the tape was recorded.
     Guard { form: Form, value: Value },
     /// The log densities of numbers.
@@ -62,8 +62,8 @@ impl Op {
                 from.iter().enumerate().for_each(|(i, at)| v[*out + i] = v[*at]);
                 true
             }
-            Op::Call { builtin, args, out } => match call(builtin, args, v) {
-                Some((_, value)) => out.write(v, &value),
+            Op::Call { builtin, args, out, before } => match call_from(builtin, args, v, before) {
+                Some(value) => out.write(v, &value),
                 None => false,
             },
             Op::Guard { form, value } => form.value(v).is_some_and(|now| now.same(value)),
@@ -113,7 +113,7 @@ impl Op {
                 from.iter().enumerate().for_each(|(i, at)| g[*at] += g[out + i]);
                 true
             }
-            Op::Call { builtin, args, out } => {
+            Op::Call { builtin, args, out, .. } => {
                 let by = out.adjoint(g);
                 pull_call(builtin, args, &by, v, g)
             }

@@ -6,7 +6,7 @@ use crate::lang::builtins::{Builtin, Table};
 use crate::lang::value::Value;
 
 fn builtin(table: &Table, name: &str) -> Builtin {
-    *table.get(table.find("", name).unwrap())
+    table.get(table.find("", name).unwrap()).clone()
 }
 
 fn normal(mean: f64, sd: f64) -> Dist {

@@ -67,6 +67,7 @@ impl<W: Write> CsvSink<W> {
     }
 
     /// The comments at the head of the file.
+    #[doc(hidden)]
     pub fn comments(&self) -> &str {
         &self.comments
     }

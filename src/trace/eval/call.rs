@@ -231,7 +231,7 @@ impl Graph {
     }
 
     fn call_builtin(&mut self, code: &Code, n: NodeId, builtin: u32, args: &WrittenArgs) -> Result<Step, Failure> {
-        if !matches!(self.nodes[n as usize].side.as_deref(), None | Some(Side::Deps(_))) {
+        if !matches!(self.nodes[n as usize].side.as_deref(), None | Some(Side::Deps(_) | Side::Kept(_))) {
             self.let_side_go(code, n);
         }
         let frame = self.nodes[n as usize].frame;
@@ -243,7 +243,7 @@ impl Graph {
             return Ok(step);
         }
         let mut deps: Deps = operands.iter().filter_map(|o| self.resolve(frame, *o)).collect();
-        let value = {
+        let made = {
             let mut gathered = Deps::new();
             let values: SmallVec<[&Value; 8]> = order
                 .iter()
@@ -253,11 +253,10 @@ impl Graph {
                 })
                 .collect();
             deps.extend(gathered);
-            super::apply(b, &values)
+            self.apply_at(n, b, &values)
         };
-        let value = value.map_err(|e| self.fault(code, n, e))?;
-        self.set_deps(n, deps);
-        Ok(self.finish(code, n, value))
+        let made = made.map_err(|e| self.fault(code, n, e))?;
+        Ok(self.finish_call(code, n, deps, made))
     }
 
     pub(super) fn evaluate_mem(&mut self, code: &Code, n: NodeId, f: Operand) -> Result<Step, Failure> {

@@ -11,7 +11,7 @@ pub(crate) use observe::Score;
 use super::demand::{Failure, Step};
 use super::graph::Graph;
 use super::node::*;
-use crate::lang::builtins::Builtin;
+use crate::lang::builtins::{Before, Builtin};
 use crate::lang::code::{Code, Op, Operand};
 use crate::lang::error::{Fault, FaultKind};
 use crate::lang::value::{Closure, Value};
@@ -28,13 +28,13 @@ impl Graph {
             Op::Prim { builtin, args } => {
                 let builtin = code.builtins.get(*builtin);
                 let mut deps = Deps::new();
-                let value = match self.inputs(code, frame, args, &mut deps).map(|values| apply(builtin, &values)) {
-                    Ok(value) => value,
-                    Err(m) => return self.need(code, m),
-                };
-                let value = value.map_err(|e| self.fault(code, n, e))?;
-                self.set_deps(n, deps);
-                Ok(self.finish(code, n, value))
+                let made =
+                    match self.inputs(code, frame, args, &mut deps).map(|values| self.apply_at(n, builtin, &values)) {
+                        Ok(made) => made,
+                        Err(m) => return self.need(code, m),
+                    };
+                let made = made.map_err(|e| self.fault(code, n, e))?;
+                Ok(self.finish_call(code, n, deps, made))
             }
             Op::Array(items) => {
                 if let Some(step) = self.await_plain(code, n, frame, items)? {
@@ -164,6 +164,29 @@ impl Graph {
         }
     }
 
+    /// Calls a built-in at a node: an incremental function from where it was.
+    fn apply_at(&self, n: NodeId, builtin: &Builtin, values: &[&Value]) -> Result<Made, Fault> {
+        match builtin.resume(values, self.kept(n)) {
+            None => builtin.apply(values).map(Made::Value),
+            Some(made) => made.map(Made::Kept),
+        }
+    }
+
+    /// Ends the evaluation of a call.
+    fn finish_call(&mut self, code: &Code, n: NodeId, deps: Deps, made: Made) -> Step {
+        match made {
+            Made::Value(value) => {
+                self.set_deps(n, deps);
+                self.finish(code, n, value)
+            }
+            Made::Kept(before) => {
+                let value = before.value.clone();
+                self.keep(n, deps, before);
+                self.finish(code, n, value)
+            }
+        }
+    }
+
     /// Turns a fault of a built-in into an error at a node.
     pub(super) fn fault(&self, code: &Code, n: NodeId, f: Fault) -> Failure {
         self.fail(code, n, f.kind, f.message, f.hint)
@@ -173,6 +196,13 @@ impl Graph {
     pub(super) fn type_error(&self, code: &Code, n: NodeId, message: String) -> Failure {
         self.fail(code, n, FaultKind::Type, message, None)
     }
+}
+
+/// What a call gave.
+enum Made {
+    Value(Value),
+    /// With what to start from next time.
+    Kept(Before),
 }
 
 /// Calls a built-in with values.

@@ -109,7 +109,7 @@ impl Reverse<'_> {
                 continue;
             }
             if part.is_unknown() {
-                let name = builtin.args.get(i).or(builtin.args.last()).map_or("", |a| a.name);
+                let name = builtin.args.get(i).or(builtin.args.last()).map_or("", |a| &*a.name);
                 return Err(self.no_derivative(n, &format!("`{}` by its argument `{name}`", builtin.full_name())));
             }
             self.give_node(source, part);

@@ -40,7 +40,9 @@ impl Reverse<'_> {
                 Some(Side::MemoCall(c)) if c.result != NONE => all.push(self.whole(c.result)),
                 Some(Side::Loop(l)) if l.result != NONE => all.push(self.whole(l.result)),
                 // A built-in called as a value.
-                Some(Side::Deps(deps)) => all.extend(deps.iter().map(|d| self.whole(*d))),
+                Some(Side::Deps(deps) | Side::Kept(Kept { deps, .. })) => {
+                    all.extend(deps.iter().map(|d| self.whole(*d)))
+                }
                 _ => {}
             },
             Op::Select { .. } => all.extend(self.taken(n).and_then(|o| self.source(frame, o))),

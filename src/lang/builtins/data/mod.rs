@@ -12,7 +12,7 @@ mod options;
 pub use options::{Options, has_options};
 
 use super::scene::{DepthValue, ImageValue, KeypointsValue, MaskValue, SolidValue};
-use super::{Arg, Args, Builtin, Type, arg, function, opt};
+use super::{Arg, Args, Row, Type, arg, function, opt};
 use crate::geom::{GeomError, Solid, gltf, obj};
 use crate::lang::error::{Fault, FaultKind};
 use crate::lang::value::Value;
@@ -33,11 +33,11 @@ const SHAPE: &[Arg] = &[
         .unit("m"),
 ];
 
-const fn kind(name: &'static str, returns: Type, doc: &'static str) -> Builtin {
+const fn kind(name: &'static str, returns: Type, doc: &'static str) -> Row {
     function(name, SECTION, FILE, returns, doc, not_an_expression)
 }
 
-pub(super) const TABLE: &[Builtin] = &[
+pub(super) const TABLE: &[Row] = &[
     kind("csv", Type::Record, "A table with a header line: a record of columns, numbers, bools or strings."),
     kind("json", Type::Any, "JSON: objects are records, null is nothing."),
     kind(
@@ -80,7 +80,7 @@ pub(super) const TABLE: &[Builtin] = &[
 ];
 
 fn not_an_expression(a: &Args) -> Result<Value, Fault> {
-    let name = a.builtin.name;
+    let name = &a.builtin.name;
     let message = format!("{name}: files are read by `data` items only");
     Err(Fault::new(FaultKind::Other, message).with_hint(format!("write `data d = {name}(\"file\");` at the top level")))
 }

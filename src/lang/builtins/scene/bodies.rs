@@ -3,7 +3,7 @@
 use super::shapes::vector_of;
 use super::{ARMATURE, AffineValue, ArmatureValue, SOLID, SolidValue, body_pulls, fault, native};
 use crate::geom::armature::{Armature, JointPose, Rules, Stretch, Turn, autorig};
-use crate::lang::builtins::{Args, Builtin, Type, arg, opt};
+use crate::lang::builtins::{Args, Row, Type, arg, opt};
 use crate::lang::error::Fault;
 use crate::lang::value::{Record, Value};
 use glam::{DMat3, DVec3};
@@ -13,7 +13,7 @@ const SECTION: &str = "Bodies";
 const BODY: &str = "an armature";
 const FACTORS: &str = "a record of numbers, or of three numbers each";
 
-pub(super) const TABLE: &[Builtin] = &[
+pub(super) const TABLE: &[Row] = &[
     native(
         "skin",
         SECTION,

@@ -4,7 +4,7 @@ use super::adjoints::BySolid;
 use super::observed::{DepthValue, ImageValue, MaskValue};
 use super::{VIEW, ViewValue, native};
 use crate::lang::adjoint::Adjoint;
-use crate::lang::builtins::{Arg, Args, Builtin, Pulled, Type, arg, opt};
+use crate::lang::builtins::{Arg, Args, Pulled, Row, Type, arg, opt};
 use crate::lang::error::Fault;
 use crate::lang::value::{Likelihood, Value};
 use crate::render::{Contours, Frame, View};
@@ -23,7 +23,7 @@ pub(super) const SEEN: Arg = arg("view", VIEW, "The view.");
 pub(super) const SIZE: Arg =
     opt("size", Type::Int, "128", "The longer side of the picture that is drawn, 8 to 4096.").unit("pixels");
 
-pub(super) const TABLE: &[Builtin] = &[
+pub(super) const TABLE: &[Row] = &[
     native(
         "contour",
         SECTION,
@@ -157,12 +157,12 @@ pub(super) fn by_view(by: Adjoint, others: usize) -> Pulled {
 }
 
 /// By the view, from derivatives by the pieces of its contours.
-fn by_contours(view: &View, size: u32, by_piece: &[[f64; 4]]) -> Adjoint {
+pub(crate) fn by_contours(view: &View, size: u32, by_piece: &[[f64; 4]]) -> Adjoint {
     BySolid { landmarks: Vec::new(), vertices: view.pull_contours(size, by_piece) }.into_adjoint()
 }
 
 /// By the view, from what each pixel brings that the object covers.
-pub(super) fn by_silhouette(view: &View, size: u32, gains: &[f64]) -> Adjoint {
+pub(crate) fn by_silhouette(view: &View, size: u32, gains: &[f64]) -> Adjoint {
     BySolid { landmarks: Vec::new(), vertices: view.pull_mask(size, gains) }.into_adjoint()
 }
 

@@ -10,7 +10,7 @@ use super::{ViewValue, native};
 use crate::diag::nearest;
 use crate::geom::Landmark;
 use crate::lang::adjoint::Adjoint;
-use crate::lang::builtins::{Builtin, Type, opt};
+use crate::lang::builtins::{Row, Type, opt};
 use crate::lang::value::{Likelihood, Located, Value};
 use crate::render::{Camera, View};
 use crate::rng::Stream;
@@ -19,7 +19,7 @@ use glam::DVec3;
 use smallvec::smallvec;
 use std::sync::Arc;
 
-pub(super) const TABLE: &[Builtin] = &[native(
+pub(super) const TABLE: &[Row] = &[native(
     "keypoints",
     SECTION,
     &[

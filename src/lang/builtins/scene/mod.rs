@@ -15,10 +15,11 @@ mod seeing;
 mod shape_pulls;
 mod shapes;
 
+pub(crate) use compare::{by_contours, by_silhouette};
 pub use objects::{AffineValue, ArmatureValue, CameraValue, SolidValue, ViewValue};
 pub use observed::{DepthValue, ImageValue, KeypointsValue, MaskValue};
 
-use super::{Arg, Args, Builtin, Type, function};
+use super::{Arg, Args, Row, Type, function};
 use crate::geom::GeomError;
 use crate::lang::error::{Fault, FaultKind};
 use crate::lang::value::Value;
@@ -37,14 +38,14 @@ const fn native(
     returns: Type,
     doc: &'static str,
     f: fn(&Args) -> Result<Value, Fault>,
-) -> Builtin {
-    Builtin { module: "scene", ..function(name, section, args, returns, doc, f) }
+) -> Row {
+    Row { module: "scene", ..function(name, section, args, returns, doc, f) }
 }
 
 /// All of them.
-pub(super) fn all() -> impl Iterator<Item = Builtin> {
+pub(super) fn all() -> impl Iterator<Item = &'static Row> {
     let tables = [shapes::TABLE, bodies::TABLE, seeing::TABLE, compare::TABLE, compare_keypoints::TABLE, region::TABLE];
-    tables.into_iter().flatten().copied()
+    tables.into_iter().flatten()
 }
 
 /// A shape that cannot be made: numbers outside their domain reject a proposal, anything else ends the run.

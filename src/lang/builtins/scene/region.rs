@@ -5,7 +5,7 @@ use super::compare::{SECTION, SEEN, SIZE, by_silhouette, by_view, image, likelih
 use super::native;
 use super::observed::ImageValue;
 use crate::lang::adjoint::Adjoint;
-use crate::lang::builtins::{Args, Builtin, Type, opt};
+use crate::lang::builtins::{Args, Row, Type, opt};
 use crate::lang::error::Fault;
 use crate::lang::value::{Likelihood, Value};
 use crate::render::{Frame, View};
@@ -18,7 +18,7 @@ use std::sync::Arc;
 /// The most groups beside the background; parts from here on share the last one.
 const MOST_GROUPS: u16 = 15;
 
-pub(super) const TABLE: &[Builtin] = &[native(
+pub(super) const TABLE: &[Row] = &[native(
     "region",
     SECTION,
     &[

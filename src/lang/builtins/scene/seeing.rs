@@ -3,7 +3,7 @@
 use super::shapes::vector;
 use super::{CAMERA, CameraValue, SOLID, SolidValue, VIEW, ViewValue, native};
 use crate::lang::adjoint::Adjoint;
-use crate::lang::builtins::{Builtin, Type, arg, opt};
+use crate::lang::builtins::{Row, Type, arg, opt};
 use crate::lang::error::Fault;
 use crate::lang::value::Value;
 use crate::render::{Camera, Projection, View};
@@ -16,7 +16,7 @@ const SECTION: &str = "Seeing";
 /// The most that contours may be off, in pixels.
 const MOST_DETAIL: f64 = 16.0;
 
-pub(super) const TABLE: &[Builtin] = &[
+pub(super) const TABLE: &[Row] = &[
     native(
         "camera",
         SECTION,

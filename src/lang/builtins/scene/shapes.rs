@@ -2,7 +2,7 @@
 
 use super::{AFFINE, AffineValue, SOLID, SolidValue, fault, native, shape_pulls};
 use crate::geom::{Affine, Caps, Landmark, Profile, Solid, cuboid};
-use crate::lang::builtins::{Args, Builtin, Type, arg, opt};
+use crate::lang::builtins::{Args, Row, Type, arg, opt};
 use crate::lang::error::Fault;
 use crate::lang::value::Value;
 use glam::DVec3;
@@ -10,7 +10,7 @@ use std::sync::Arc;
 
 const SECTION: &str = "Shapes";
 
-pub(super) const TABLE: &[Builtin] = &[
+pub(super) const TABLE: &[Row] = &[
     native(
         "lathe",
         SECTION,

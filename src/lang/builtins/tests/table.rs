@@ -38,7 +38,7 @@ fn names_are_found_by_module() {
     assert!(TABLE.find("", "..").is_some());
     assert!(TABLE.find("nowhere", "sqrt").is_none());
     for (i, b) in TABLE.iter().enumerate() {
-        assert_eq!(TABLE.find(b.module, b.name), Some(i as u32));
+        assert_eq!(TABLE.find(&b.module, &b.name), Some(i as u32));
     }
 }
 
@@ -52,18 +52,17 @@ const KEYWORDS: &[&str] = &[
 #[test]
 fn every_entry_is_well_formed() {
     let mut seen = HashSet::new();
-    let own = crate::lang::builtins::table::all();
-    for b in own {
+    for b in crate::lang::builtins::table::all() {
         let name = b.full_name();
-        assert!(seen.insert((b.module, b.name)), "{name} is there twice");
-        assert!(!KEYWORDS.contains(&b.name), "{name} is a keyword");
-        assert!(TABLE.constant(b.name).is_none(), "{name} is a constant too");
+        assert!(seen.insert(name.clone()), "{name} is there twice");
+        assert!(!KEYWORDS.contains(&&*b.name), "{name} is a keyword");
+        assert!(TABLE.constant(&b.name).is_none(), "{name} is a constant too");
         assert!(b.doc.ends_with('.') && !b.section.is_empty(), "{name}: {}", b.doc);
         let mut names = HashSet::new();
         let mut optional = false;
-        for a in b.args {
-            assert!(names.insert(a.name), "{name}: {} is there twice", a.name);
-            assert!(!KEYWORDS.contains(&a.name), "{name}: {} is a keyword", a.name);
+        for a in b.args.iter() {
+            assert!(names.insert(&*a.name), "{name}: {} is there twice", a.name);
+            assert!(!KEYWORDS.contains(&&*a.name), "{name}: {} is a keyword", a.name);
             assert!(a.doc.ends_with('.'), "{name}: {}", a.doc);
             assert!(a.default.is_some() || !optional, "{name}: {} must be given after one that need not be", a.name);
             optional |= a.default.is_some();

@@ -1,0 +1,65 @@
+//! A kernel of the host, called by name in `infer`: `cargo run --release --example embed_kernel`.
+//!
+//! It reflects one number about a point, which keeps volume and leads back: a jump between two modes that walks seldom make.
+
+use pcadlang::host::{Datum, Entry, Host, Type};
+use pcadlang::infer::{At, Kernel, Outcome, Scope, decide, recoverable};
+use pcadlang::trace::{Change, Trace, TraceResult};
+use pcadlang::{Error, Program, RunOptions};
+
+/// `reflect(sel, about)`.
+struct Reflect {
+    scope: Scope,
+    about: f64,
+}
+
+impl Kernel for Reflect {
+    fn name(&self) -> String {
+        "reflect".into()
+    }
+
+    fn step(&mut self, trace: &mut Trace, at: &At) -> TraceResult<Outcome> {
+        let mut rng = at.stream();
+        let selection = trace.select(&self.scope.selector);
+        let targets = trace.targets(selection);
+        if targets.is_empty() {
+            return Ok(Outcome::default());
+        }
+        let target = targets[rng.index(targets.len())];
+        let Some(x) = trace.stored(target).and_then(|x| x.num()) else { return Ok(Outcome::default()) };
+        let change = Change::Set(Datum::Num(2.0 * self.about - x));
+        // A place where the program has no value is a rejection, not the end of the run.
+        let Some(weight) = recoverable(trace.propose(&[(target, change)], at.draws(0)))? else {
+            return Ok(Outcome::failed().at(target));
+        };
+        Ok(decide(trace, at.tempered(&weight), &mut rng).at(target))
+    }
+}
+
+/// The host.
+pub fn host() -> Host {
+    let reflect = Entry::kernel("reflect", |call| Ok(Reflect { scope: call.scope(0)?, about: call.args().num(1)? }))
+        .argument("sel", Type::Selection, "Numbers; one of them moves.")
+        .optional("about", Type::Num, 0.0, "The point that it is reflected about.")
+        .about("Metropolis-Hastings by reflection of one number.");
+    Host::new().with(reflect)
+}
+
+/// How much of the posterior is on the right, where 0.8 of it is.
+///
+/// # Errors
+/// What is wrong with the program.
+pub fn share_on_the_right() -> Result<f64, Error> {
+    let text = "assume x ~ mixture([0.2, 0.8], [normal(-4, 0.5), normal(4, 0.5)]);
+                observe normal(x, 100) = 0;
+                infer { repeat 20000 { drift(@x, scale = 0.5); reflect(@x); } }";
+    let model = Program::parse(text)?.host(&host())?.compile()?;
+    let posterior = model.run(&RunOptions { seed: 1, ..RunOptions::default() }, 1, 1)?;
+    let x = posterior.quantity("x").map_or(Vec::new(), |q| q.chains.concat());
+    Ok(x.iter().filter(|x| **x > 0.0).count() as f64 / x.len() as f64)
+}
+
+fn main() -> Result<(), Error> {
+    println!("on the right: {:.3} (0.8)", share_on_the_right()?);
+    Ok(())
+}

@@ -1,0 +1,284 @@
+//! One thing that a host brings.
+
+use super::Previous;
+use super::checked::Checked;
+use crate::dist::{Dist, Distribution};
+use crate::infer::{Kernel, KernelCall, KernelMaker};
+use crate::lang::adjoint::Adjoint;
+use crate::lang::builtins::{Args, Argument, Before, Builtin, Derivative, Foreign, State, Type};
+use crate::lang::error::{Fault, FaultKind};
+use crate::lang::value::{Likelihood, Value};
+use crate::syntax::{is_keyword, is_name};
+use std::borrow::Cow;
+use std::sync::Arc;
+
+/// One thing that a host brings: a function, a family of distributions or likelihoods, a kernel. Arguments are told in their order.
+///
+/// Closures are called from several threads at once, and must give the same for the same arguments, to the last bit.
+#[derive(Clone)]
+pub struct Entry {
+    pub(super) builtin: Builtin,
+    pub(super) replaces: bool,
+    /// What was said of it that does not fit.
+    pub(super) wrong: Option<String>,
+}
+
+impl Entry {
+    fn new(name: impl Into<Cow<'static, str>>, section: &'static str, returns: Type, foreign: Foreign) -> Entry {
+        let (kind, derivative) = foreign.entry();
+        let builtin = Builtin {
+            name: name.into(),
+            module: "".into(),
+            section: section.into(),
+            args: [].into(),
+            variadic: false,
+            returns,
+            doc: "Of the host.".into(),
+            kind,
+            scalar: None,
+            derivative,
+            foreign: Some(foreign),
+        };
+        Entry { builtin, replaces: false, wrong: None }
+    }
+
+    /// A function.
+    ///
+    /// ```
+    /// use pcadlang::host::{Entry, Fault, Host, Type};
+    /// use pcadlang::{Program, Value};
+    /// let table = vec![3.0, 1.0, 2.0];
+    /// let look_up = Entry::function("look_up", move |a| {
+    ///     let i = a.int_in(0, 0, 2)?;
+    ///     Ok(Value::Num(table[i as usize]))
+    /// })
+    /// .argument("i", Type::Int, "Which one.")
+    /// .section("The host's tables")
+    /// .returns(Type::Num)
+    /// .flat();
+    /// let model = Program::parse("let x = look_up(0); predict y ~ normal(x, 1);")?.host(&Host::new().with(look_up))?;
+    /// assert!(model.compile().is_ok());
+    /// # Ok::<(), pcadlang::Error>(())
+    /// ```
+    pub fn function(
+        name: impl Into<Cow<'static, str>>,
+        call: impl Fn(&Args) -> Result<Value, Fault> + Send + Sync + 'static,
+    ) -> Entry {
+        Entry::new(name, HOST, Type::Any, Foreign::Function { call: Arc::new(call), pull: None })
+    }
+
+    /// A function that can go on from an earlier evaluation, and what it then keeps for the next one.
+    ///
+    /// It must give what it gives from scratch (`None`), bit for bit: an earlier evaluation saves work and nothing else. What it
+    /// keeps belongs to the place in the program where it is called and to the state of the trace: a rejected proposal goes back
+    /// to what was kept before it, forks of a trace share it, and it is never changed, so a large one had better share what stays the same.
+    ///
+    /// ```
+    /// use pcadlang::host::{Entry, Fault, Host, Previous, Type};
+    /// use pcadlang::trace::{Draws, Trace};
+    /// use pcadlang::{Program, Value};
+    /// use std::sync::Arc;
+    /// use std::sync::atomic::{AtomicUsize, Ordering};
+    /// // The sum of the squares of whole numbers, which is exact in any order.
+    /// let squared = Arc::new(AtomicUsize::new(0));
+    /// let count = Arc::clone(&squared);
+    /// let squares = Entry::incremental("squares", move |a, previous: Option<Previous<Vec<f64>>>| {
+    ///     let xs = a.array(0)?;
+    ///     let mut each = match &previous {
+    ///         Some(p) if p.state().len() == xs.len() => p.state().clone(),
+    ///         _ => vec![0.0; xs.len()],
+    ///     };
+    ///     let changed = previous.and_then(|p| p.changed_elements(a, 0)).unwrap_or((0..xs.len()).collect());
+    ///     for i in changed {
+    ///         count.fetch_add(1, Ordering::Relaxed);
+    ///         each[i] = xs[i] * xs[i];
+    ///     }
+    ///     Ok((Value::Num(each.iter().sum()), each))
+    /// })
+    /// .argument("xs", Type::Array, "Numbers.");
+    /// let text = "assume a ~ poisson(4); assume b ~ poisson(4); observe normal(squares([a, b]), 1) = 25;";
+    /// let model = Program::parse(text)?.host(&Host::new().with(squares))?.compile()?;
+    /// let mut trace = model.simulate(1, 0)?;
+    /// for (address, value) in [("@a", 3.0), ("@b", 4.0), ("@a", 5.0)] {
+    ///     squared.store(0, Ordering::Relaxed);
+    ///     trace.set(address, value, Draws::default()).unwrap();
+    ///     assert!(squared.load(Ordering::Relaxed) <= 1);
+    /// }
+    /// # Ok::<(), pcadlang::Error>(())
+    /// ```
+    pub fn incremental<S: Send + Sync + 'static>(
+        name: impl Into<Cow<'static, str>>,
+        call: impl Fn(&Args, Option<Previous<'_, S>>) -> Result<(Value, S), Fault> + Send + Sync + 'static,
+    ) -> Entry {
+        let call = move |a: &Args, before: Option<&Before>| {
+            let previous = before.and_then(Previous::new);
+            call(a, previous).map(|(value, state)| (value, Arc::new(state) as State))
+        };
+        Entry::new(name, HOST, Type::Any, Foreign::Incremental { call: Arc::new(call), pull: None })
+    }
+
+    /// A family of distributions: from its parameters to one of them. A parameter outside its domain is a [`Fault::domain`].
+    ///
+    /// A value whose log density is NaN counts as impossible. [`Gradient::params`](crate::host::Gradient) are by the numbers in the arguments, one after the other.
+    pub fn distribution<D: Distribution + 'static>(
+        name: impl Into<Cow<'static, str>>,
+        make: impl Fn(&Args) -> Result<D, Fault> + Send + Sync + 'static,
+    ) -> Entry {
+        let make = move |a: &Args| make(a).map(|d| Dist::Custom(Arc::new(Checked(d))));
+        Entry::new(name, "Distributions", Type::Dist, Foreign::Family(Arc::new(make)))
+    }
+
+    /// A family of likelihoods: from its arguments to one of them, which scores what is observed. A comparator is one whose
+    /// argument is a view (see [`Seen`](crate::host::Seen)).
+    ///
+    /// [`Likelihood::gradient`] is a list: the adjoint of each argument in turn.
+    pub fn likelihood<L: Likelihood + 'static>(
+        name: impl Into<Cow<'static, str>>,
+        make: impl Fn(&Args) -> Result<L, Fault> + Send + Sync + 'static,
+    ) -> Entry {
+        let make = move |a: &Args| make(a).map(|l| Value::Likelihood(Arc::new(l)));
+        Entry::new(name, "Comparing", Type::Likelihood, Foreign::Likelihood(Arc::new(make)))
+    }
+
+    /// A kernel for `infer` blocks: from the call as written to what moves the trace. Each chain makes its own.
+    pub fn kernel<K: Kernel + 'static>(
+        name: impl Into<Cow<'static, str>>,
+        make: impl Fn(&mut KernelCall) -> Result<K, Fault> + Send + Sync + 'static,
+    ) -> Entry {
+        let maker = KernelMaker::new(move |call| Ok(Box::new(make(call)?)));
+        Entry::new(name, "Kernels", Type::Kernel, Foreign::Kernel(Arc::new(maker)))
+    }
+
+    /// One more argument, which must be given.
+    #[must_use]
+    pub fn argument(self, name: impl Into<Cow<'static, str>>, ty: Type, about: impl Into<Cow<'static, str>>) -> Entry {
+        let (name, doc) = (name.into(), about.into());
+        self.push(Argument { name, ty, unit: "".into(), default: None, value: Value::Unit, doc })
+    }
+
+    /// One more argument, with the value it has where it is left out.
+    #[must_use]
+    pub fn optional(
+        self,
+        name: impl Into<Cow<'static, str>>,
+        ty: Type,
+        default: impl Into<Value>,
+        about: impl Into<Cow<'static, str>>,
+    ) -> Entry {
+        let (name, doc, value) = (name.into(), about.into(), default.into());
+        self.push(Argument { name, ty, unit: "".into(), default: Some(value.to_string().into()), value, doc })
+    }
+
+    /// The unit of the argument told last.
+    #[must_use]
+    pub fn unit(mut self, unit: impl Into<Cow<'static, str>>) -> Entry {
+        let mut args = self.builtin.args.to_vec();
+        match args.last_mut() {
+            Some(a) => a.unit = unit.into(),
+            None => self.wrong = Some("a unit belongs to an argument".into()),
+        }
+        self.builtin.args = args.into();
+        self
+    }
+
+    /// What it gives, as far as static checks and `doc` are concerned.
+    #[must_use]
+    pub fn returns(mut self, ty: Type) -> Entry {
+        self.builtin.returns = ty;
+        self
+    }
+
+    /// A line about it.
+    #[must_use]
+    pub fn about(mut self, line: impl Into<Cow<'static, str>>) -> Entry {
+        self.builtin.doc = line.into();
+        self
+    }
+
+    /// The heading it stands under in the reference.
+    #[must_use]
+    pub fn section(mut self, heading: impl Into<Cow<'static, str>>) -> Entry {
+        self.builtin.section = heading.into();
+        self
+    }
+
+    /// The vector-Jacobian product of a function: from its arguments, its result and the result's adjoint to the adjoints of the
+    /// arguments in order; `None` where it is not known. Those left out at the end are zero.
+    #[must_use]
+    pub fn gradient(
+        mut self,
+        product: impl Fn(&Args, &Value, &Adjoint) -> Option<Vec<Adjoint>> + Send + Sync + 'static,
+    ) -> Entry {
+        match &mut self.builtin.foreign {
+            Some(Foreign::Function { pull, .. } | Foreign::Incremental { pull, .. }) => *pull = Some(Arc::new(product)),
+            _ => {
+                self.wrong = Some("only functions take a gradient: distributions and likelihoods have their own".into())
+            }
+        }
+        if let Some(f) = &self.builtin.foreign {
+            self.builtin.derivative = f.entry().1;
+        }
+        self
+    }
+
+    /// Its derivative is zero wherever there is one: what counts, compares or rounds.
+    #[must_use]
+    pub fn flat(mut self) -> Entry {
+        match &self.builtin.foreign {
+            Some(Foreign::Function { .. } | Foreign::Incremental { .. }) => self.builtin.derivative = Derivative::Zero,
+            _ => self.wrong = Some("only functions are flat".into()),
+        }
+        self
+    }
+
+    /// It takes the place of the language's own of that name.
+    ///
+    /// ```
+    /// use pcadlang::host::{Entry, Host, Type};
+    /// use pcadlang::{Program, Value};
+    /// let sqrt = || Entry::function("sqrt", |a| Ok(Value::Num(a.num(0)?.abs().sqrt()))).argument("x", Type::Num, "A number.");
+    /// let program = || Program::parse("let x = sqrt(-4);");
+    /// let taken = program()?.host(&Host::new().with(sqrt())).err().unwrap();
+    /// assert!(taken.to_string().contains("`sqrt` is a name of the language"));
+    /// assert!(program()?.host(&Host::new().with(sqrt().replacing()))?.compile().is_ok());
+    /// # Ok::<(), pcadlang::Error>(())
+    /// ```
+    #[must_use]
+    pub fn replacing(mut self) -> Entry {
+        self.replaces = true;
+        self
+    }
+
+    fn push(mut self, argument: Argument) -> Entry {
+        self.builtin.args = self.builtin.args.iter().cloned().chain([argument]).collect();
+        self
+    }
+
+    /// What is wrong with the arguments.
+    pub(super) fn check_arguments(&self) -> Vec<String> {
+        let (name, args) = (&self.builtin.name, &self.builtin.args);
+        let mut wrong = Vec::new();
+        for (i, a) in args.iter().enumerate() {
+            let (own, before) = (&a.name, &args[..i]);
+            if !is_name(own) || is_keyword(own) {
+                wrong.push(format!("`{own}`, an argument of `{name}`, is no name"));
+            }
+            if before.iter().any(|b| b.name == *own) {
+                wrong.push(format!("`{name}` has two arguments `{own}`"));
+            }
+            if a.default.is_none() && before.iter().any(|b| b.default.is_some()) {
+                wrong.push(format!("`{name}`: `{own}` must be given, so it stands before those that need not be"));
+            }
+        }
+        wrong
+    }
+}
+
+const HOST: &str = "Of the host";
+
+/// Parameters that are none: a proposal that leads there is rejected.
+impl From<crate::dist::ParamError> for Fault {
+    fn from(e: crate::dist::ParamError) -> Fault {
+        Fault::new(FaultKind::Domain, e.to_string())
+    }
+}

@@ -1,0 +1,116 @@
+//! What a host program brings to the language: functions, distributions, likelihoods and kernels under names of their own.
+//!
+//! A [`Host`] is a list of [`Entry`]s. They go into the one table of built-ins, so static checks, error messages, completion and
+//! `doc` know them as they know the language's own.
+//!
+//! ```
+//! use pcadlang::host::{Adjoint, Entry, Host, Type};
+//! use pcadlang::{Program, Value};
+//! // The host's own drag, with what it has captured and its derivative.
+//! let density = 1.2;
+//! let drag = Entry::function("drag", move |a| Ok(Value::Num(0.5 * density * a.num(0)? * a.num(0)?)))
+//!     .argument("speed", Type::Num, "How fast it moves.").unit("m/s")
+//!     .returns(Type::Num)
+//!     .about("The drag of a unit area.")
+//!     .gradient(move |a, _, by| Some(vec![Adjoint::Num(by.number() * density * a.num(0).ok()?)]));
+//! let host = Host::new().with(drag);
+//! let text = "assume v ~ normal(10, 2); observe normal(drag(v), 1) = 55; infer { repeat 500 { hmc(@v); } }";
+//! let model = Program::parse(text)?.host(&host)?.compile()?;
+//! let posterior = model.run(&Default::default(), 1, 1)?;
+//! let v = posterior.quantity("v").unwrap().summary.mean;
+//! assert!((v - 9.57).abs() < 0.1, "{v}");
+//!
+//! assert!(host.doc("drag").unwrap().contains("number, m/s."));
+//! let wrong = Program::parse("let d = drag(speeed = 1);")?.host(&host)?.compile().unwrap_err();
+//! assert!(wrong.to_string().contains("did you mean `speed`?"));
+//! # Ok::<(), pcadlang::Error>(())
+//! ```
+
+#![doc = include_str!("guide.md")]
+
+mod checked;
+mod entry;
+mod previous;
+mod seen;
+
+#[doc(inline)]
+pub use crate::dist::{Datum, Distribution, Gradient, ParamError, Support};
+#[doc(inline)]
+pub use crate::infer::KernelCall;
+#[doc(inline)]
+pub use crate::lang::adjoint::Adjoint;
+#[doc(inline)]
+pub use crate::lang::builtins::{Args, Type};
+#[doc(inline)]
+pub use crate::lang::error::{Fault, FaultKind};
+#[doc(inline)]
+pub use crate::lang::value::{Likelihood, Located, Object};
+pub use entry::Entry;
+pub use previous::Previous;
+pub use seen::Seen;
+
+use crate::Error;
+use crate::diag::{Diagnostic, Severity, SourceMap};
+use crate::lang::builtins::{Builtin, Table, doc};
+use crate::syntax::{is_keyword, is_name};
+use std::sync::Arc;
+
+/// What a host brings along; see the [module](self).
+#[derive(Clone, Default)]
+pub struct Host {
+    entries: Vec<Entry>,
+}
+
+impl Host {
+    /// Nothing yet.
+    pub fn new() -> Host {
+        Host::default()
+    }
+
+    /// The same with one more.
+    #[must_use]
+    pub fn with(mut self, entry: Entry) -> Host {
+        self.entries.push(entry);
+        self
+    }
+
+    /// What `pcadlang doc` says of a name: the host's own, or the language's. `None` also where an entry is not valid.
+    pub fn doc(&self, name: &str) -> Option<String> {
+        doc::doc(&*self.table().ok()?, name)
+    }
+
+    /// The built-ins of the language and the host's.
+    ///
+    /// # Errors
+    /// A name that is none or taken, arguments that cannot be told apart, a gradient of what is no function: all of them.
+    pub(crate) fn table(&self) -> Result<Arc<Table>, Error> {
+        let own = Table::default();
+        let mut diagnostics = Vec::new();
+        let mut wrong = |message: String, hint: &str| {
+            let d = Diagnostic::new(Severity::Error, message);
+            diagnostics.push(if hint.is_empty() { d } else { d.hint(hint) });
+        };
+        for (i, e) in self.entries.iter().enumerate() {
+            let (b, name) = (&e.builtin, &*e.builtin.name);
+            let taken = own.find("", name).is_some() || own.constant(name).is_some();
+            if !is_name(name) || is_keyword(name) {
+                wrong(
+                    format!("`{name}` cannot be the name of a host's function"),
+                    "a letter or `_`, then letters, digits and `_`; no word of the grammar",
+                );
+            } else if own.constant(name).is_some() || taken && !e.replaces {
+                wrong(format!("`{name}` is a name of the language"), "take another; functions can be `replacing()`");
+            } else if self.entries[..i].iter().any(|o| o.builtin.name == b.name) {
+                wrong(format!("the host brings `{name}` twice"), "");
+            }
+            if let Some(what) = &e.wrong {
+                wrong(format!("`{name}`: {what}"), "");
+            }
+            e.check_arguments().into_iter().for_each(|message| wrong(message, ""));
+        }
+        match diagnostics.is_empty() {
+            true => Ok(Arc::new(Table::new(self.entries.iter().map(|e| Builtin::clone(&e.builtin))))),
+            false => Err(Error { diagnostics, sources: SourceMap::new() }),
+        }
+    }
+}

@@ -1,0 +1,77 @@
+//! An earlier evaluation of an incremental function.
+
+use crate::lang::builtins::{Args, Before};
+use crate::lang::value::Value;
+
+/// An earlier evaluation of a function of the host: its arguments, its result, what it kept ([`Entry::incremental`](super::Entry::incremental)).
+#[derive(Clone, Copy, Debug)]
+pub struct Previous<'a, S> {
+    before: &'a Before,
+    state: &'a S,
+}
+
+impl<'a, S: 'static> Previous<'a, S> {
+    /// None if another kind of state was kept.
+    pub(super) fn new(before: &'a Before) -> Option<Self> {
+        before.state.downcast_ref().map(|state| Previous { before, state })
+    }
+}
+
+impl<'a, S> Previous<'a, S> {
+    /// Argument `i` as it was.
+    pub fn argument(&self, i: usize) -> &'a Value {
+        self.before.args.get(i).unwrap_or(&Value::Unit)
+    }
+
+    /// The result.
+    pub fn value(&self) -> &'a Value {
+        &self.before.value
+    }
+
+    /// What was kept.
+    pub fn state(&self) -> &'a S {
+        self.state
+    }
+
+    /// Whether argument `i` is another than it was. What is shared by pointer is told at once, numbers by their bits.
+    ///
+    /// ```
+    /// use pcadlang::host::{Entry, Host, Previous, Type};
+    /// use pcadlang::trace::Draws;
+    /// use pcadlang::{Program, Value};
+    /// // `slow(mesh, x)` prepares `mesh`, which seldom changes; how often it did is what it gives.
+    /// let slow = Entry::incremental("slow", |a, previous: Option<Previous<f64>>| {
+    ///     let prepared = match previous {
+    ///         Some(p) if !p.changed(a, 0) => {
+    ///             assert!(p.argument(0).same(a.get(0)) && p.value().same(&Value::Num(*p.state())));
+    ///             *p.state()
+    ///         }
+    ///         _ => a.num(0)? + 1.0,
+    ///     };
+    ///     Ok((Value::Num(prepared), prepared))
+    /// })
+    /// .argument("mesh", Type::Num, "What is prepared.")
+    /// .argument("x", Type::Num, "The rest.");
+    /// let text = "assume m ~ normal(0, 1); assume x ~ normal(0, 1); observe normal(slow(m, x), 1) = 0;";
+    /// let mut trace = Program::parse(text)?.host(&Host::new().with(slow))?.compile()?.simulate(1, 0)?;
+    /// trace.set("@x", 2.0, Draws::default()).unwrap();
+    /// # Ok::<(), pcadlang::Error>(())
+    /// ```
+    pub fn changed(&self, a: &Args, i: usize) -> bool {
+        !self.argument(i).same(a.get(i))
+    }
+
+    /// The elements of argument `i` that are others than they were; `None` if it is no array, or of another length than it was.
+    pub fn changed_elements(&self, a: &Args, i: usize) -> Option<Vec<usize>> {
+        let (old, new) = (self.argument(i), a.get(i));
+        match (old, new) {
+            (Value::Array(x), Value::Array(y)) if x.len() == y.len() => {
+                Some((0..x.len()).filter(|i| x[*i].to_bits() != y[*i].to_bits()).collect())
+            }
+            (Value::List(x), Value::List(y)) if x.len() == y.len() => {
+                Some((0..x.len()).filter(|i| !x[*i].same(&y[*i])).collect())
+            }
+            _ => None,
+        }
+    }
+}

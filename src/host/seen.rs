@@ -1,0 +1,134 @@
+//! What a host's comparator sees of a scene.
+
+use crate::lang::adjoint::Adjoint;
+use crate::lang::builtins::Args;
+use crate::lang::builtins::scene::{ViewValue, by_contours, by_silhouette};
+use crate::lang::error::Fault;
+use crate::render::View;
+use std::fmt;
+use std::sync::Arc;
+
+/// A solid before a camera (what `scene.render` gives), drawn when asked and once a size. `longer` is the longer side of the picture in
+/// pixels.
+///
+/// ```
+/// use pcadlang::host::{Adjoint, Entry, Host, Likelihood, Seen, Type};
+/// use pcadlang::{Program, Value};
+/// /// The number of pixels that a solid covers, observed with some noise: a comparator with a gradient.
+/// #[derive(Debug)]
+/// struct Area {
+///     seen: Seen,
+///     sd: f64,
+/// }
+///
+/// impl Area {
+///     fn off(&self, observed: &Value) -> Result<f64, String> {
+///         let Value::Num(wanted) = observed else { return Err("an area is a number".into()) };
+///         Ok((self.seen.mask(64).iter().filter(|covered| **covered).count() as f64 - wanted) / self.sd)
+///     }
+/// }
+///
+/// impl Likelihood for Area {
+///     fn name(&self) -> &str {
+///         "area"
+///     }
+///     fn log_density(&self, observed: &Value) -> Result<f64, String> {
+///         self.off(observed).map(|z| -0.5 * z * z)
+///     }
+///     fn gradient(&self, observed: &Value) -> Option<Adjoint> {
+///         let (width, height) = self.seen.size(64);
+///         let each = -self.off(observed).ok()? / self.sd;
+///         let by_view = self.seen.by_mask(64, &vec![each; (width * height) as usize]);
+///         Some(Adjoint::List(vec![by_view, Adjoint::Unknown]))
+///     }
+/// }
+///
+/// let area = Entry::likelihood("area", |a| Ok(Area { seen: Seen::of(a, 0)?, sd: a.positive_or(1, 20.0)? }))
+///     .argument("view", Type::Object("a view"), "What is seen.")
+///     .optional("sd", Type::Num, 20.0, "The noise.").unit("pixels");
+/// let text = r#"include "std/scene.pcad" as scene;
+///     assume size ~ uniform(0.3, 2);
+///     let ball = scene.affine(scale = size) * scene.sphere();
+///     observe area(scene.render(ball)) = 800 as seen;
+///     infer { repeat 60 { hmc(@size, steps = 3); } }"#;
+/// let model = Program::parse(text)?.host(&Host::new().with(area))?.compile()?;
+/// let size = model.run(&Default::default(), 1, 1)?.quantity("size").unwrap().summary.mean;
+/// let covered = model.simulate(0, 0)?;
+/// assert!((0.8..1.3).contains(&size), "{size}");
+/// # Ok::<(), pcadlang::Error>(())
+/// ```
+#[derive(Clone)]
+pub struct Seen(Arc<View>);
+
+impl fmt::Debug for Seen {
+    fn fmt(&self, f: &mut fmt::Formatter<'_>) -> fmt::Result {
+        f.write_str("a view")
+    }
+}
+
+impl Seen {
+    /// The view that argument `i` is.
+    ///
+    /// # Errors
+    /// If it is none.
+    pub fn of(a: &Args, i: usize) -> Result<Seen, Fault> {
+        a.object::<ViewValue>(i, "a view").map(|v| Seen(Arc::clone(&v.0)))
+    }
+
+    /// Width and height of its picture.
+    pub fn size(&self, longer: u32) -> (u32, u32) {
+        let camera = self.0.camera().scaled_to(longer);
+        (camera.width, camera.height)
+    }
+
+    /// Whether each pixel shows the solid, row by row.
+    pub fn mask(&self, longer: u32) -> Vec<bool> {
+        self.0.frame(longer).mask().collect()
+    }
+
+    /// How far away what each pixel shows is, row by row, in scene units; infinite where it shows nothing.
+    pub fn depth(&self, longer: u32) -> Vec<f32> {
+        self.0.depth(longer).depth.clone()
+    }
+
+    /// The pieces of the contours: x, y and length in pixels, and angle in radians, from right to down.
+    ///
+    /// ```
+    /// use pcadlang::host::{Entry, Host, Seen, Type};
+    /// use pcadlang::{Program, Value};
+    /// let outline = Entry::function("outline", |a| {
+    ///     let seen = Seen::of(a, 0)?;
+    ///     let nearest = seen.depth(64).into_iter().fold(f32::INFINITY, f32::min);
+    ///     assert!((6.9..7.1).contains(&nearest));
+    ///     let pieces = seen.contours(64);
+    ///     // The sum of the lengths has derivative 1 by each.
+    ///     let by_view = seen.by_contours(64, &vec![[0.0, 0.0, 1.0, 0.0]; pieces.len()]);
+    ///     assert!(!by_view.is_zero());
+    ///     Ok(Value::Num(pieces.iter().map(|p| p[2]).sum()))
+    /// })
+    /// .argument("view", Type::Object("a view"), "What is seen.");
+    /// let text = r#"include "std/scene.pcad" as scene;
+    ///     assume shift ~ normal(0, 0.01);
+    ///     observe normal(outline(scene.render(scene.affine(translate = [shift, 0, 0]) * scene.sphere())), 1) = 90;"#;
+    /// Program::parse(text)?.host(&Host::new().with(outline))?.compile()?.simulate(0, 0)?;
+    /// # Ok::<(), pcadlang::Error>(())
+    /// ```
+    pub fn contours(&self, longer: u32) -> Vec<[f64; 4]> {
+        let c = self.0.contours(longer);
+        let piece = |i: usize| {
+            let angle = libm::atan2(f64::from(c.ty[i]), f64::from(c.tx[i]));
+            [f64::from(c.x[i]), f64::from(c.y[i]), f64::from(c.length[i]), angle]
+        };
+        (0..c.x.len()).map(piece).collect()
+    }
+
+    /// The adjoint of the view, from the derivatives by the pieces of its contours.
+    pub fn by_contours(&self, longer: u32, by_piece: &[[f64; 4]]) -> Adjoint {
+        by_contours(&self.0, longer, by_piece)
+    }
+
+    /// The adjoint of the view, from what each pixel brings that the solid covers: the outline moves, and takes pixels in.
+    pub fn by_mask(&self, longer: u32, gains: &[f64]) -> Adjoint {
+        by_silhouette(&self.0, longer, gains)
+    }
+}

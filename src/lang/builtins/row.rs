@@ -1,0 +1,125 @@
+//! The rows that the language's own built-ins are written in: constants, from which the table's entries are made.
+
+use super::{Args, Argument, Builtin, Derivative, Kind, Pull, Scalar, Type};
+use crate::lang::error::Fault;
+use crate::lang::value::Value;
+
+/// One argument.
+#[derive(Clone, Copy, Debug)]
+pub struct Arg {
+    pub name: &'static str,
+    pub ty: Type,
+    pub unit: &'static str,
+    pub default: Option<&'static str>,
+    pub doc: &'static str,
+}
+
+/// An argument that must be given.
+pub const fn arg(name: &'static str, ty: Type, doc: &'static str) -> Arg {
+    Arg { name, ty, unit: "", default: None, doc }
+}
+
+/// An argument with a default.
+pub const fn opt(name: &'static str, ty: Type, default: &'static str, doc: &'static str) -> Arg {
+    Arg { name, ty, unit: "", default: Some(default), doc }
+}
+
+impl Arg {
+    /// The same with a unit.
+    pub const fn unit(self, unit: &'static str) -> Arg {
+        Arg { unit, ..self }
+    }
+}
+
+/// One built-in: see [`Builtin`].
+#[derive(Clone, Copy)]
+pub struct Row {
+    pub name: &'static str,
+    pub module: &'static str,
+    pub section: &'static str,
+    pub args: &'static [Arg],
+    pub variadic: bool,
+    pub returns: Type,
+    pub doc: &'static str,
+    pub kind: Kind,
+    pub scalar: Option<Scalar>,
+    pub derivative: Derivative,
+}
+
+/// A pure function of the language's own namespace.
+pub const fn function(
+    name: &'static str,
+    section: &'static str,
+    args: &'static [Arg],
+    returns: Type,
+    doc: &'static str,
+    f: fn(&Args) -> Result<Value, Fault>,
+) -> Row {
+    Row::new(Kind::Function(f), name, section, args, returns, doc)
+}
+
+impl Row {
+    /// One of the language's own namespace, of which no derivative is known.
+    pub const fn new(
+        kind: Kind,
+        name: &'static str,
+        section: &'static str,
+        args: &'static [Arg],
+        returns: Type,
+        doc: &'static str,
+    ) -> Row {
+        let derivative = Derivative::Unknown;
+        Row { name, module: "", section, args, variadic: false, returns, doc, kind, scalar: None, derivative }
+    }
+
+    /// The same, known to be this on single numbers.
+    pub const fn scalar(self, f: Scalar) -> Row {
+        Row { scalar: Some(f), ..self }
+    }
+
+    /// The same with a last argument that may be given any number of times.
+    pub const fn variadic(self) -> Row {
+        Row { variadic: true, ..self }
+    }
+
+    /// The same with its vector-Jacobian product.
+    pub const fn pull(self, f: Pull) -> Row {
+        Row { derivative: Derivative::Product(f), ..self }
+    }
+
+    /// The same with a derivative.
+    pub const fn derivative(self, derivative: Derivative) -> Row {
+        Row { derivative, ..self }
+    }
+
+    /// The same, with a derivative of zero wherever there is one.
+    pub const fn flat(self) -> Row {
+        Row { derivative: Derivative::Zero, ..self }
+    }
+}
+
+impl From<&Row> for Builtin {
+    fn from(r: &Row) -> Builtin {
+        let argument = |a: &Arg| Argument {
+            name: a.name.into(),
+            ty: a.ty,
+            unit: a.unit.into(),
+            default: a.default.map(Into::into),
+            value: Value::Unit,
+            doc: a.doc.into(),
+        };
+        Builtin {
+            name: r.name.into(),
+            module: r.module.into(),
+            section: r.section.into(),
+            args: r.args.iter().map(argument).collect(),
+            variadic: r.variadic,
+            returns: r.returns,
+            doc: r.doc.into(),
+            kind: r.kind,
+            scalar: r.scalar,
+            derivative: r.derivative,
+            foreign: None,
+        }
+    }
+}

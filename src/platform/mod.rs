@@ -1,0 +1,4 @@
+//! What differs between platforms and builds: the clock and threads.
+
+pub(crate) mod clock;
+pub(crate) mod threads;
