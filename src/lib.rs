@@ -17,6 +17,7 @@ pub mod num;
 pub mod render;
 pub mod report;
 pub mod rng;
+pub mod session;
 pub mod syntax;
 pub mod trace;
 pub mod vision;

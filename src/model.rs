@@ -15,7 +15,7 @@ use crate::infer::{ChainError, ChainResult, Progress, RunOptions, default_plan, 
 use crate::lang::builtins::data::Options;
 use crate::lang::builtins::scene::{CameraValue, DepthValue, ImageValue, KeypointsValue, MaskValue};
 use crate::lang::builtins::{Table, data};
-use crate::lang::code::Code;
+use crate::lang::code::{Code, Eager};
 use crate::lang::error::{Fault, FaultKind, RunError};
 use crate::lang::load::{Disk, Loaded, Loader, Nowhere, load, load_text, read, reason};
 use crate::lang::lower::{Compiled, Export, Inputs, Interface, Report, compile, inspect};
@@ -23,14 +23,15 @@ use crate::lang::value::Value;
 use crate::render::Camera;
 use crate::report::{ChainDraws, Memory, Quantity, bytes_hash, quantities, text_hash};
 use crate::rng::{Purpose, StreamKey};
-use crate::syntax::ast::KStmt;
-use crate::syntax::parse;
+use crate::syntax::ast::{Item, ItemKind, KStmt, Stmt, StmtKind};
+use crate::syntax::span::FileId;
+use crate::syntax::{SyntaxError, parse, parse_expr};
 use crate::trace::{Draws, Limits, Trace};
 use indexmap::IndexMap;
 use rustc_hash::FxHashMap;
 use std::cell::RefCell;
 use std::fmt;
-use std::sync::Arc;
+use std::sync::{Arc, Mutex, PoisonError};
 
 /// What is wrong with a program, its data, or a run of it: messages with their places.
 #[derive(Clone)]
@@ -79,17 +80,24 @@ impl IntoDiagnostic for RunError {
 /// The argument that the run's camera stands in for.
 const RENDER: (&str, &str) = ("scene.render", "camera");
 
-/// A program on its way to a [`Model`]: loaded, its inputs not yet given.
+/// Files of data that a program has read, with their hashes, by kind, path and how they were read.
+type Files = Arc<Mutex<FxHashMap<(String, String, String), (Value, String)>>>;
+
+/// A program on its way to a [`Model`]: loaded, its inputs not yet given. A clone can go another way: both keep what they read.
+#[derive(Clone)]
 pub struct Program {
     loaded: Loaded,
     sources: SourceMap,
-    loader: Box<dyn Loader>,
+    loader: Arc<dyn Loader + Send + Sync>,
+    name: String,
     text: String,
     sets: Vec<(String, String)>,
     data: IndexMap<String, Value>,
     defaults: FxHashMap<(&'static str, &'static str), Value>,
     needs_data: bool,
+    eager: Eager,
     builtins: Arc<Table>,
+    files: Files,
 }
 
 impl Program {
@@ -100,7 +108,7 @@ impl Program {
     pub fn open(path: &str) -> Result<Program, Error> {
         let mut sources = SourceMap::new();
         match load(path, &Disk, &mut sources) {
-            Ok(loaded) => Ok(Program::new(loaded, sources, Box::new(Disk))),
+            Ok(loaded) => Ok(Program::new(path, loaded, sources, Arc::new(Disk))),
             Err(diagnostics) => Err(Error { diagnostics, sources }),
         }
     }
@@ -110,26 +118,123 @@ impl Program {
     /// # Errors
     /// If it does not parse.
     pub fn parse(text: &str) -> Result<Program, Error> {
+        Program::read("<program>", text, Arc::new(Nowhere))
+    }
+
+    /// A program from its text, which stands for a file of this name: what it includes and reads is found from there.
+    ///
+    /// # Errors
+    /// As [`Program::open`].
+    pub fn named(name: &str, text: &str) -> Result<Program, Error> {
+        Program::read(name, text, Arc::new(Disk))
+    }
+
+    fn read(name: &str, text: &str, loader: Arc<dyn Loader + Send + Sync>) -> Result<Program, Error> {
         let mut sources = SourceMap::new();
-        match load_text("<program>", text, &Nowhere, &mut sources) {
-            Ok(loaded) => Ok(Program::new(loaded, sources, Box::new(Nowhere))),
+        match load_text(name, text, &*loader, &mut sources) {
+            Ok(loaded) => Ok(Program::new(name, loaded, sources, loader)),
             Err(diagnostics) => Err(Error { diagnostics, sources }),
         }
     }
 
-    fn new(loaded: Loaded, sources: SourceMap, loader: Box<dyn Loader>) -> Program {
+    /// The same program with another text: what it was given stays, and so do the files that it has read.
+    ///
+    /// # Errors
+    /// As [`Program::open`].
+    pub fn edited(&self, text: &str) -> Result<Program, Error> {
+        let new = Program::read(&self.name, text, Arc::clone(&self.loader))?;
+        let (loaded, sources, text) = (new.loaded, new.sources, new.text);
+        Ok(Program { loaded, sources, text, ..self.clone() })
+    }
+
+    /// The same program with more items at its end, from a text of its own that includes nothing.
+    ///
+    /// # Errors
+    /// If the text does not parse.
+    pub fn and(&self, name: &str, text: &str) -> Result<Program, Error> {
+        self.with_items(name, text, |text, file| match parse(text, file) {
+            (program, errors) if errors.is_empty() => Ok(program.items),
+            (_, errors) => Err(errors),
+        })
+    }
+
+    /// The same program with `sample e;` at its end, `e` being the expression of a text of its own: its value is that of the last
+    /// of [`Code::samples`].
+    ///
+    /// # Errors
+    /// If the text is no expression.
+    pub fn asking(&self, name: &str, text: &str) -> Result<Program, Error> {
+        self.with_items(name, text, |text, file| {
+            let expr = parse_expr(text, file)?;
+            let span = expr.span;
+            let stmt = Stmt { kind: StmtKind::Sample(expr), span };
+            Ok(vec![Item { kind: ItemKind::Stmt(stmt), span }])
+        })
+    }
+
+    fn with_items(
+        &self,
+        name: &str,
+        text: &str,
+        items: impl Fn(&str, FileId) -> Result<Vec<Item>, Vec<SyntaxError>>,
+    ) -> Result<Program, Error> {
+        let mut more = self.clone();
+        let file = more.sources.add(name, text);
+        match items(text, file) {
+            Ok(items) => {
+                if let Some(main) = more.loaded.units.first_mut() {
+                    main.includes.resize(main.includes.len() + items.len(), None);
+                    main.program.items.extend(items);
+                }
+                Ok(more)
+            }
+            Err(errors) => {
+                let diagnostics = errors.into_iter().map(IntoDiagnostic::into_diagnostic).collect();
+                Err(Error { diagnostics, sources: more.sources })
+            }
+        }
+    }
+
+    /// The same program as it would be loaded from a file of its text: from there it includes and reads.
+    ///
+    /// # Errors
+    /// If it would not load from there.
+    pub fn written_as(&self, path: &str) -> Result<Program, Error> {
+        Program { name: path.to_owned(), loader: Arc::new(Disk), ..self.clone() }.edited(&self.text)
+    }
+
+    /// Another program with what this one was given, as far as it asks for it.
+    ///
+    /// # Errors
+    /// As [`Program::open`].
+    pub fn replaced(&self, path: &str) -> Result<Program, Error> {
+        let new = Program::open(path)?;
+        let interface = new.interface();
+        let mut new = Program { loaded: new.loaded, sources: new.sources, name: new.name, text: new.text, ..self.clone() };
+        new.sets.retain(|(name, _)| interface.params.iter().any(|p| p.name == *name));
+        new.data.retain(|name, _| interface.data.iter().any(|d| d.name == *name));
+        // Files may have changed.
+        new.files = Files::default();
+        new.loader = Arc::new(Disk);
+        Ok(new)
+    }
+
+    fn new(name: &str, loaded: Loaded, sources: SourceMap, loader: Arc<dyn Loader + Send + Sync>) -> Program {
         let text =
             loaded.units.first().and_then(|u| sources.get(u.file)).map_or(String::new(), |f| f.text().to_string());
         Program {
             loaded,
             sources,
             loader,
+            name: name.to_owned(),
             text,
             sets: Vec::new(),
             data: IndexMap::new(),
             defaults: FxHashMap::default(),
             needs_data: true,
+            eager: Eager::default(),
             builtins: Arc::new(Table::default()),
+            files: Files::default(),
         }
     }
 
@@ -138,9 +243,20 @@ impl Program {
         inspect(&self.loaded)
     }
 
+    /// The name of its main file.
+    pub fn name(&self) -> &str {
+        &self.name
+    }
+
     /// The text of its main file.
     pub fn text(&self) -> &str {
         &self.text
+    }
+
+    /// The `data` items that have no value yet.
+    pub fn missing_data(&self) -> Vec<String> {
+        let open = self.interface().data.into_iter().filter(|d| !d.has_default && !self.data.contains_key(&d.name));
+        open.map(|d| d.name).collect()
     }
 
     /// A hash of its text, that of the files it includes, and the parameters set so far: that of the model it gives.
@@ -156,6 +272,7 @@ impl Program {
     /// Sets a `param`, its value written as in a program.
     #[must_use]
     pub fn set(mut self, name: &str, value: &str) -> Program {
+        self.sets.retain(|(n, _)| n != name);
         self.sets.push((name.into(), value.into()));
         self
     }
@@ -200,6 +317,13 @@ impl Program {
         self
     }
 
+    /// Says what is to run although nothing asks for it.
+    #[must_use]
+    pub fn eager(mut self, eager: Eager) -> Program {
+        self.eager = eager;
+        self
+    }
+
     /// The camera of views that name none.
     #[must_use]
     pub fn camera(self, camera: Camera) -> Program {
@@ -238,18 +362,24 @@ impl Program {
     /// Everything that is wrong with it.
     pub fn compile(mut self) -> Result<Model, Error> {
         self.default_camera();
-        let loader = &*self.loader;
+        let (loader, files) = (&*self.loader, &*self.files);
         let data_hash = RefCell::new(String::new());
         let read_data = |kind: &str, path: &str, folder: &str, options: &Options| {
             let beside = format!("{folder}{path}");
-            let file = data::path_of(kind, &beside);
-            match read(loader, file) {
-                Ok((bytes, _)) => {
-                    data_hash.borrow_mut().push_str(&bytes_hash(&bytes));
-                    data::load(kind, &beside, &bytes, options, &|other| sibling(loader, &beside, other))
-                }
-                Err(e) => Err(Fault::new(FaultKind::Other, format!("cannot read {file}: {}", reason(&e)))),
+            let key = (kind.to_owned(), beside.clone(), format!("{options:?}"));
+            let mut files = files.lock().unwrap_or_else(PoisonError::into_inner);
+            if let Some((value, hash)) = files.get(&key) {
+                data_hash.borrow_mut().push_str(hash);
+                return Ok(value.clone());
             }
+            let file = data::path_of(kind, &beside);
+            let (bytes, _) = read(loader, file)
+                .map_err(|e| Fault::new(FaultKind::Other, format!("cannot read {file}: {}", reason(&e))))?;
+            let value = data::load(kind, &beside, &bytes, options, &|other| sibling(loader, &beside, other))?;
+            let hash = bytes_hash(&bytes);
+            data_hash.borrow_mut().push_str(&hash);
+            files.insert(key, (value.clone(), hash));
+            Ok(value)
         };
         let inputs = Inputs {
             builtins: Arc::clone(&self.builtins),
@@ -258,6 +388,7 @@ impl Program {
             read: &read_data,
             needs_data: self.needs_data,
             defaults: self.defaults,
+            eager: self.eager,
         };
         match compile(&self.loaded, inputs, &mut self.sources) {
             Ok(compiled) => {
@@ -410,10 +541,25 @@ impl Model {
         let file = sources.add("<default plan>", &text);
         let (program, _) = parse(&text, file);
         let body = program.items.into_iter().find_map(|i| match i.kind {
-            crate::syntax::ast::ItemKind::Infer { body, .. } => Some(body),
+            ItemKind::Infer { body, .. } => Some(body),
             _ => None,
         });
         Ok((body.unwrap_or_default().into(), Some(text)))
+    }
+
+    /// The names of its inference blocks that have one.
+    pub fn plan_names(&self) -> impl Iterator<Item = &str> {
+        self.compiled.plans.iter().filter_map(|p| p.name.as_deref())
+    }
+
+    /// The inference block of a name.
+    pub fn plan_named(&self, name: &str) -> Option<Arc<[KStmt]>> {
+        self.compiled.plans.iter().find(|p| p.name.as_deref() == Some(name)).map(|p| Arc::clone(&p.body))
+    }
+
+    /// The last inference block.
+    pub fn last_plan(&self) -> Option<Arc<[KStmt]>> {
+        self.compiled.plans.last().map(|p| Arc::clone(&p.body))
     }
 
     /// Runs chains and keeps their draws in memory. Draws depend on the seed, never on the number of threads.

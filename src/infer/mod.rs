@@ -27,6 +27,8 @@ pub use chains::run_chains;
 pub use default_plan::default_plan;
 pub(crate) use init::attempts;
 pub use init::{Start, StartError, starts};
+pub(crate) use force::put as force;
+pub(crate) use kernel::accepts;
 pub use kernel::{At, Kernel, Outcome, Pick, Scope};
 pub use kernels::{
     Abc, AbcSmc, Block, Delayed, Drift, Elliptical, Gibbs, Hamiltonian, Hmc, Independent, Knn, Mh, Nuts, Optimize,
@@ -35,4 +37,5 @@ pub use kernels::{
 pub use neighbours::{Banks, Latent, Latents, Neighbours};
 pub(crate) use parallel::in_parallel;
 pub use plan::{ChainError, ChainResult, Checkpoint, Progress, RunOptions, Watch, run_from};
+pub use selection::selected;
 pub use state::StateError;
