@@ -1,92 +1,65 @@
-//! The draws of a chain in bounded memory: when they are too many, every other one goes.
+//! What is kept of the draws of a run: some of them, and counts over all.
 
-use crate::infer::draws::{Column, DrawRow, Sink, width};
-use crate::report::ChainDraws;
+use crate::infer::draws::{Column, DrawRow, Sink};
+use crate::report::{ChainDraws, Memory};
 use std::io;
 use std::sync::{Arc, Mutex, PoisonError};
 
-/// Draws kept at most.
-const DRAWS: usize = 16_384;
 /// Numbers kept at most.
-const NUMBERS: usize = 8_000_000;
+const NUMBERS: usize = 4_000_000;
 
 /// The draws so far. Clones share them: one goes to the chain, the other is looked into.
-#[derive(Clone, Debug, Default)]
-pub(super) struct Kept(Arc<Mutex<Inner>>);
-
-#[derive(Debug, Default)]
-struct Inner {
-    columns: Vec<Column>,
-    rows: Vec<DrawRow>,
-    /// One of so many is kept.
-    stride: u64,
-    /// Draws that came.
-    seen: u64,
-    best: Option<f64>,
-    last: Option<f64>,
-    /// Draws that were another state than the one before.
-    moved: u64,
+#[derive(Clone, Debug)]
+pub(super) struct Kept {
+    memory: Memory,
+    seen: Arc<Mutex<Seen>>,
 }
 
-/// What is known of the draws so far.
+/// What is known of all draws so far.
 #[derive(Clone, Copy, Debug, Default, PartialEq)]
 pub(super) struct Seen {
     pub draws: u64,
+    /// Draws that are another state than the one before, as far as the log joint density tells.
     pub moved: u64,
     pub best: Option<f64>,
+    last: Option<f64>,
+}
+
+impl Default for Kept {
+    fn default() -> Self {
+        Kept { memory: Memory::bounded(NUMBERS), seen: Arc::default() }
+    }
 }
 
 impl Kept {
-    fn inner<T>(&self, f: impl FnOnce(&mut Inner) -> T) -> T {
-        f(&mut self.0.lock().unwrap_or_else(PoisonError::into_inner))
-    }
-
-    /// What is known of the draws so far.
+    /// What is known of all draws so far.
     pub fn seen(&self) -> Seen {
-        self.inner(|i| Seen { draws: i.seen, moved: i.moved, best: i.best })
+        *self.seen.lock().unwrap_or_else(PoisonError::into_inner)
     }
 
     /// The draws that are kept.
     pub fn draws(&self) -> ChainDraws {
-        self.inner(|i| ChainDraws { comments: Vec::new(), columns: i.columns.clone(), rows: i.rows.clone() })
+        self.memory.draws()
     }
 }
 
 impl Sink for Kept {
     fn columns(&mut self, columns: &[Column]) -> io::Result<()> {
-        self.inner(|i| {
-            i.columns = columns.to_vec();
-            i.stride = 1;
-        });
-        Ok(())
+        self.memory.columns(columns)
     }
 
     fn draw(&mut self, row: &DrawRow) -> io::Result<()> {
-        self.inner(|i| {
-            i.moved += u64::from(i.last.is_none_or(|l| l.to_bits() != row.log_joint.to_bits()));
-            i.last = Some(row.log_joint);
-            i.best = Some(i.best.map_or(row.log_joint, |b| b.max(row.log_joint)));
-            if i.seen.is_multiple_of(i.stride.max(1)) {
-                let most = (NUMBERS / width(&i.columns).max(1)).clamp(2, DRAWS);
-                if i.rows.len() >= most {
-                    let mut at = 0;
-                    i.rows.retain(|_| {
-                        at += 1;
-                        at % 2 == 1
-                    });
-                    i.stride *= 2;
-                }
-                if i.seen.is_multiple_of(i.stride) {
-                    i.rows.push(row.clone());
-                }
-            }
-            i.seen += 1;
-        });
-        Ok(())
+        let mut seen = self.seen.lock().unwrap_or_else(PoisonError::into_inner);
+        seen.draws += 1;
+        seen.moved += u64::from(seen.last.is_none_or(|l| l.to_bits() != row.log_joint.to_bits()));
+        seen.last = Some(row.log_joint);
+        seen.best = Some(seen.best.map_or(row.log_joint, |b| b.max(row.log_joint)));
+        drop(seen);
+        self.memory.draw(row)
     }
 
-    fn chain_done(&mut self, _: u32, _: u64, _: u64, _: f64) -> io::Result<()> {
-        Ok(())
+    fn chain_done(&mut self, chain: u32, steps: u64, warmup: u64, seconds: f64) -> io::Result<()> {
+        self.memory.chain_done(chain, steps, warmup, seconds)
     }
 }
 
@@ -95,19 +68,17 @@ mod tests {
     use super::*;
 
     #[test]
-    fn memory_is_bounded_and_draws_stay_evenly_spaced() {
-        let mut kept = Kept::default();
-        kept.columns(&[Column::scalar("x")]).unwrap();
-        for draw in 0..100_000 {
-            let log_joint = -((draw / 2) as f64);
-            let row =
-                DrawRow { chain: 1, draw, step: draw, log_joint, log_prior: 0.0, log_likelihood: 0.0, values: vec![0.5] };
-            kept.draw(&row).unwrap();
+    fn all_draws_count_and_clones_see_them() {
+        let kept = Kept::default();
+        let mut sink = kept.clone();
+        sink.columns(&[Column::scalar("x")]).unwrap();
+        for (draw, log_joint) in [-3.0, -1.0, -1.0, -2.0].into_iter().enumerate() {
+            let draw = draw as u64;
+            let row = DrawRow { chain: 1, draw, step: draw, log_joint, log_prior: 0.0, log_likelihood: 0.0, values: vec![0.5] };
+            sink.draw(&row).unwrap();
         }
-        let rows = kept.draws().rows;
-        assert!(rows.len() <= DRAWS && rows.len() > DRAWS / 2 - 2, "{}", rows.len());
-        let step = rows[1].draw - rows[0].draw;
-        assert!(rows.windows(2).all(|w| w[1].draw - w[0].draw == step) && rows[0].draw == 0, "every {step}th");
-        assert_eq!(kept.seen(), Seen { draws: 100_000, moved: 50_000, best: Some(0.0) });
+        let seen = kept.seen();
+        assert_eq!((seen.draws, seen.moved, seen.best), (4, 3, Some(-1.0)));
+        assert_eq!(kept.draws().rows.len(), 4);
     }
 }
