@@ -43,6 +43,12 @@ fn modules_depend_one_way() {
         ("trace", &["trace", "lang", "syntax", "diag", "dist", "num", "rng"]),
         ("infer", &["infer", "trace", "lang", "syntax", "diag", "dist", "num", "rng"]),
         ("report", &["report", "infer", "num"]),
+        (
+            "session",
+            &[
+                "session", "bank", "Model", "model", "report", "infer", "trace", "lang", "syntax", "diag", "geom", "render", "rng",
+            ],
+        ),
         ("bank", &["bank", "Model", "report", "infer", "trace", "lang", "dist", "render", "vision", "num", "rng"]),
     ];
     let mut seen = 0;

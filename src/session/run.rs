@@ -14,7 +14,7 @@ use crate::syntax::ast::KStmt;
 use crate::trace::{Limits, Stop};
 use std::path::Path;
 use std::sync::Arc;
-use std::sync::atomic::Ordering;
+use std::sync::atomic::{AtomicBool, Ordering};
 use std::sync::mpsc::{Receiver, RecvTimeoutError, channel};
 use std::thread::JoinHandle;
 use std::time::{Duration, Instant};
@@ -36,7 +36,9 @@ pub(super) struct Background {
     progress: Arc<Progress>,
     kept: Kept,
     began: Instant,
+    /// Told when it is over, and whether it is.
     done: Receiver<()>,
+    is_done: Arc<AtomicBool>,
     thread: JoinHandle<Result<ChainResult, ChainError>>,
 }
 
@@ -175,11 +177,13 @@ impl Session {
         };
         let (progress, kept) = (Arc::new(Progress::default()), Kept::default());
         let (over, done) = channel();
+        let is_done = Arc::new(AtomicBool::new(false));
         let thread = {
             let (code, plan) = (Arc::clone(job.model.code()), job.plan);
-            let (progress, mut sink) = (Arc::clone(&progress), kept.clone());
+            let (progress, mut sink, ended) = (Arc::clone(&progress), kept.clone(), Arc::clone(&is_done));
             std::thread::Builder::new().name(format!("run {number}")).spawn(move || {
                 let result = run_from(&code, &plan, &options, &progress, &mut sink, number, trace);
+                ended.store(true, Ordering::SeqCst);
                 // Nobody listens if the run was dropped.
                 let _ = over.send(());
                 result
@@ -187,7 +191,8 @@ impl Session {
         };
         let thread = thread.map_err(|e| Trouble::plain(format!("no thread can be started: {e}")))?;
         let base = Arc::clone(&self.model);
-        Ok(Background { what: job.what, number, base, model: job.model, progress, kept, began: Instant::now(), done, thread })
+        let (what, model, began) = (job.what, job.model, Instant::now());
+        Ok(Background { what, number, base, model, progress, kept, began, done, is_done, thread })
     }
 
     /// Waits until a run is over; one that is stopped from outside has done nothing.
@@ -208,21 +213,8 @@ impl Session {
 
     /// Makes the last state of a run that is over the session's.
     fn adopt(&mut self, run: Background) -> Result<String, Trouble> {
-        if !Arc::ptr_eq(&run.base, &self.model) {
-            let trouble = Trouble::plain(format!("run {} is of the program as it was before it changed", run.number));
-            return Err(trouble.hint("its state is not taken over; `:plot` shows what it drew"));
-        }
         let joined = run.thread.join().map_err(|_| Trouble::plain("the run ended unexpectedly"))?;
         let result = joined.map_err(|e| run.model.chain_error(e))?;
-        let mut last = result.last;
-        if !Arc::ptr_eq(&run.model, &self.model) {
-            last = self.moved_to(&self.model, &last)?;
-        }
-        last.set_limits(self.limits);
-        let past = self.remember(&format!("inference by {}", run.what));
-        let before = self.trace.log_joint();
-        self.trace = last;
-        self.keep(past);
         let finished = Finished {
             what: run.what,
             steps: result.steps,
@@ -233,8 +225,20 @@ impl Session {
             seconds: result.seconds,
             draws: run.kept.draws(),
         };
-        let after = number(self.trace.log_joint());
-        let said = format!("{}log joint {} -> {after}\n", finished.line(), number(before));
+        if !Arc::ptr_eq(&run.base, &self.model) {
+            self.last = Some(finished);
+            let trouble = Trouble::plain(format!("run {} is of the program as it was before it changed", run.number));
+            return Err(trouble.hint("its state is not taken over; `:plot` and `:profile` show what it did"));
+        }
+        let mut last = result.last;
+        if !Arc::ptr_eq(&run.model, &self.model) {
+            last = self.moved_to(&self.model, &last)?;
+        }
+        last.set_limits(self.limits);
+        let past = self.remember(&format!("inference by {}", finished.what));
+        let before = std::mem::replace(&mut self.trace, last).log_joint();
+        self.keep(past);
+        let said = format!("{}log joint {} -> {}\n", finished.line(), number(before), number(self.trace.log_joint()));
         self.last = Some(finished);
         Ok(said)
     }
@@ -288,7 +292,7 @@ impl Session {
 
     /// The number of the run in the background, once that is over and has not been told yet: for a front end to say so.
     pub fn is_background_done(&self) -> Option<u32> {
-        self.background.as_ref().filter(|b| b.thread.is_finished()).map(|b| b.number)
+        self.background.as_ref().filter(|b| b.status().is_done).map(|b| b.number)
     }
 
     /// The draws of the run in the background, or of the last one.
@@ -319,7 +323,7 @@ impl Background {
             draws: seen.draws,
             best: seen.best,
             elapsed: self.began.elapsed(),
-            is_done: self.thread.is_finished(),
+            is_done: self.is_done.load(Ordering::SeqCst),
         }
     }
 
