@@ -277,6 +277,11 @@ impl Program {
         self
     }
 
+    /// Whether a `param` was set.
+    pub fn is_set(&self, name: &str) -> bool {
+        self.sets.iter().any(|(n, _)| n == name)
+    }
+
     /// Gives a `data` item.
     #[must_use]
     pub fn observe(mut self, name: &str, value: Value) -> Program {

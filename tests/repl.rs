@@ -110,7 +110,7 @@ fn a_photograph_is_given_as_to_run() {
     let f = Folder::new("repl_photo");
     f.write("disc.png", folder::png(folder::disc(64, 48, 34.0, 22.0, 15.0)));
     let args = ["lathe.pcad", "--observe", "disc.png", "--set", "size=48"];
-    let d = piped(&f, &args, ":render over.png\n:infer 20\n:render\n");
+    let d = piped(&f, &args, ":render over.png\n:infer mh(one(@**)) 20\n:render\n");
     assert_eq!(d.code, 0, "{}", d.err);
     assert!(d.out.contains("over.png: 768 x 576 pixels") && d.out.contains("render.png: "), "{}", d.out);
     let none = piped(&f, &["lathe.pcad"], ":render prior.png\n");

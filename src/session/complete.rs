@@ -63,8 +63,8 @@ impl Session {
     fn complete_text(&self, before: &str) -> Completion {
         if let Some(start) = open_string(before) {
             let is_program = before[..start - 1].trim_end().ends_with("include");
-            let reads = |name: &&&str| before[..start - 1].trim_end().trim_end_matches('(').ends_with(**name);
-            return match is_program || READERS.iter().find(reads).is_some() {
+            let reads = |name: &&str| before[..start - 1].trim_end().trim_end_matches('(').ends_with(*name);
+            return match is_program || READERS.iter().any(|name| reads(name)) {
                 true => found(start, &before[start..], files(&before[start..], if is_program { &[".pcad"] } else { &[] })),
                 false => Completion::default(),
             };
@@ -72,7 +72,7 @@ impl Session {
         let part_of_address = |c: char| c.is_alphanumeric() || "@_/[]#*\".-".contains(c);
         let start = before.rfind(|c: char| !part_of_address(c)).map_or(0, |i| i + before[i..].chars().next().map_or(1, char::len_utf8));
         if before[start..].contains('@') {
-            let start = start + before[start..].find('@').unwrap_or(0);
+            let start = start + before[start..].rfind('@').unwrap_or(0);
             return found(start, &before[start..], self.addresses());
         }
         let part_of_name = |c: char| c.is_alphanumeric() || c == '_' || c == '.' || c == '$';

@@ -7,7 +7,7 @@ use crate::lang::load::reason;
 use crate::lang::value::Value;
 use crate::model::{Model, Program};
 use crate::report::write_file;
-use crate::syntax::ast::{Item, ItemKind, StmtKind};
+use crate::syntax::ast::{ExprKind, Item, ItemKind, Stmt, StmtKind};
 use crate::syntax::{parse, print_expr};
 use crate::trace::Trace;
 use std::path::Path;
@@ -111,16 +111,15 @@ impl Session {
             ItemKind::Param(d) if *d.name.node == *name => Some(d),
             _ => None,
         });
-        let edited = match declared.and_then(|d| d.default.as_ref()) {
-            Some(e) => {
-                let (start, end) = (e.span.start as usize, e.span.end as usize);
-                let text = self.text();
-                self.program.edited(&format!("{}{value}{}", &text[..start], &text[end..]))?
-            }
-            None => (*self.program).clone(),
-        };
         // What the command line says goes before the default.
-        let program = edited.set(name, value);
+        let program = match declared.and_then(|d| d.default.as_ref()) {
+            Some(e) if !self.program.is_set(name) => {
+                let (before, after) = (self.text().get(..e.span.start as usize), self.text().get(e.span.end as usize..));
+                let text = format!("{}{value}{}", before.unwrap_or_default(), after.unwrap_or_default());
+                self.program.edited(&text)?
+            }
+            _ => (*self.program).clone().set(name, value),
+        };
         let past = self.remember(&format!(":set {name} {value}"));
         let said = self.rewrite(program)?;
         self.keep(past);
@@ -180,6 +179,10 @@ fn read(text: &str) -> Entry {
                 let e = slice.trim_start_matches("sample").trim_end_matches(';');
                 entry.samples.push(e.trim().to_owned());
             }
+            // What only has a value is looked at.
+            ItemKind::Stmt(Stmt { kind: StmtKind::Expr(e), .. }) if !matches!(e.kind, ExprKind::Call { .. }) => {
+                entry.samples.push(slice.trim_end_matches(';').trim().to_owned());
+            }
             kind => {
                 if let ItemKind::Infer { name: Some(name), .. } = kind {
                     entry.plans.push((Some(Arc::clone(&name.node)), slice.to_owned()));
@@ -197,14 +200,11 @@ fn read(text: &str) -> Entry {
     entry
 }
 
-/// The text with the semicolon that one forgets at a prompt.
+/// The text with the semicolon that one forgets at a prompt; on a line of its own where a comment ends the text.
 fn closed(text: &str) -> String {
-    let with = format!("{text};");
-    let file = SourceMap::new().add(INPUT, "");
-    match parse(text, file).1.is_empty() || !parse(&with, file).1.is_empty() {
-        true => text.to_owned(),
-        false => with,
-    }
+    let parses = |text: &str| parse(text, SourceMap::new().add(INPUT, "")).1.is_empty();
+    let ways = [text.to_owned(), format!("{text};"), format!("{text}\n;")];
+    ways.into_iter().find(|t| parses(t)).unwrap_or_else(|| text.to_owned())
 }
 
 /// The name that an item binds to a value worth showing.
@@ -216,7 +216,7 @@ fn bound(item: &Item) -> Option<Arc<str>> {
                 Some(Arc::clone(&name.node))
             }
             StmtKind::Draw { target, .. } => match &target.kind {
-                crate::syntax::ast::ExprKind::Var(name) => Some(Arc::clone(name)),
+                ExprKind::Var(name) => Some(Arc::clone(name)),
                 _ => None,
             },
             _ => None,

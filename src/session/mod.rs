@@ -192,7 +192,7 @@ impl Session {
                 }
             }
             if let Some(t) = impossible {
-                let note = look::impossible(&t);
+                let note = note.to_owned() + &look::impossible(&t);
                 return Ok((t, note));
             }
             if kept.is_empty() {

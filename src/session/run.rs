@@ -150,7 +150,7 @@ impl Session {
             self.background = Some(run);
             return Ok(Reply::text(text));
         }
-        self.wait_for(&run, stop)?;
+        self.wait_for(&run, stop, true)?;
         let said = self.adopt(run)?;
         Ok(Reply::text(note + &said))
     }
@@ -195,20 +195,21 @@ impl Session {
         Ok(Background { what, number, base, model, progress, kept, began, done, is_done, thread })
     }
 
-    /// Waits until a run is over; one that is stopped from outside has done nothing.
-    fn wait_for(&mut self, run: &Background, stop: Option<Stop>) -> Result<(), Trouble> {
+    /// Waits until a run is over, or until that is stopped from outside; `ends` says whether the run ends then.
+    fn wait_for(&mut self, run: &Background, stop: Option<Stop>, ends: bool) -> Result<(), Trouble> {
+        let is_stopped = || stop.is_some_and(Stop::is_set);
         while run.done.recv_timeout(PAUSE) == Err(RecvTimeoutError::Timeout) {
-            if stop.is_some_and(Stop::is_set) {
+            if is_stopped() {
+                if !ends {
+                    return Err(Trouble::Stopped);
+                }
                 run.progress.cancelled.store(true, Ordering::Relaxed);
             }
             if let Some(watch) = &mut self.watch {
                 watch(&run.status());
             }
         }
-        match stop.is_some_and(Stop::is_set) {
-            true => Err(Trouble::Stopped),
-            false => Ok(()),
-        }
+        if ends && is_stopped() { Err(Trouble::Stopped) } else { Ok(()) }
     }
 
     /// Makes the last state of a run that is over the session's.
@@ -255,26 +256,20 @@ impl Session {
     /// `:wait`.
     pub(super) fn wait(&mut self) -> Result<Reply, Trouble> {
         let run = self.taken()?;
-        let waited = self.wait_for(&run, self.limits.stop);
+        let waited = self.wait_for(&run, self.limits.stop, false);
         let said = run.line();
         self.background = Some(run);
-        match waited {
-            Ok(()) => Ok(Reply::text(said)),
-            // The run goes on: only the waiting is over.
-            Err(_) => {
-                if let Some(run) = &self.background {
-                    run.progress.cancelled.store(false, Ordering::Relaxed);
-                }
-                Err(Trouble::Stopped)
-            }
-        }
+        waited.map(|()| Reply::text(said))
     }
 
     /// `:stop`.
     pub(super) fn stop(&mut self) -> Result<Reply, Trouble> {
         let run = self.taken()?;
         run.progress.cancelled.store(true, Ordering::Relaxed);
-        self.wait_for(&run, None)?;
+        if let Err(e) = self.wait_for(&run, self.limits.stop, false) {
+            self.background = Some(run);
+            return Err(e);
+        }
         let number = run.number;
         self.adopt(run).map(|said| Reply::text(format!("run {number} is the state now\n{said}")))
     }
