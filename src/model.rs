@@ -210,7 +210,8 @@ impl Program {
     pub fn replaced(&self, path: &str) -> Result<Program, Error> {
         let new = Program::open(path)?;
         let interface = new.interface();
-        let mut new = Program { loaded: new.loaded, sources: new.sources, name: new.name, text: new.text, ..self.clone() };
+        let mut new =
+            Program { loaded: new.loaded, sources: new.sources, name: new.name, text: new.text, ..self.clone() };
         new.sets.retain(|(name, _)| interface.params.iter().any(|p| p.name == *name));
         new.data.retain(|name, _| interface.data.iter().any(|d| d.name == *name));
         // Files may have changed.

@@ -85,7 +85,11 @@ fn the_recorded_session_replays() {
 fn scripts_end_at_the_first_error() {
     let f = Folder::new("repl_scripts");
     f.write("coin.pcad", "assume p ~ beta(1, 1); observe binomial(10, p) = 7 as heads;\n");
-    let good = piped(&f, &["coin.pcad", "--seed", "3"], "let odds = p / (1 - p)\n:set @p 0.5\nodds\n:save better\n:quit\nnever");
+    let good = piped(
+        &f,
+        &["coin.pcad", "--seed", "3"],
+        "let odds = p / (1 - p)\n:set @p 0.5\nodds\n:save better\n:quit\nnever",
+    );
     assert_eq!((good.code, good.err.as_str()), (0, ""), "{}", good.out);
     assert!(good.out.lines().any(|l| l == "1") && !good.out.contains("pcad>"), "{}", good.out);
     let saved = f.read("better.pcad");

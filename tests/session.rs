@@ -94,7 +94,19 @@ fn an_error_leaves_everything_as_it_was() {
 fn looking_changes_nothing() {
     let mut s = line();
     let before = state(&s);
-    for text in [":trace", "@slope", "$line", ":why @wide", ":list", ":help", ":doc normal", ":doc :flip", ":status", "slope * 2", "next"] {
+    for text in [
+        ":trace",
+        "@slope",
+        "$line",
+        ":why @wide",
+        ":list",
+        ":help",
+        ":doc normal",
+        ":doc :flip",
+        ":status",
+        "slope * 2",
+        "next",
+    ] {
         assert!(!says(&mut s, text).is_empty(), "{text}");
     }
     assert!(says(&mut s, "fn(x) { x + slope }").contains("function"));
@@ -167,7 +179,8 @@ fn flips_say_what_they_do() {
         let said = says(&mut s, ["(none)", ":flip @slope", ":flip @wide", ":flip @**"][1 + i % 3]);
         let last = said.lines().last().unwrap();
         let change = said.lines().find(|l| l.starts_with("log joint")).unwrap();
-        let [old, new] = [0, 1].map(|k| change["log joint ".len()..].split([' ', '(']).filter(|w| *w != "->").nth(k).unwrap());
+        let [old, new] =
+            [0, 1].map(|k| change["log joint ".len()..].split([' ', '(']).filter(|w| *w != "->").nth(k).unwrap());
         let shown = pcadlang::report::number;
         assert_eq!(old, shown(f64::from_bits(before.2)), "{said}");
         let ratio: f64 = last.split("log ratio ").nth(1).unwrap().split(')').next().unwrap().parse().unwrap();
@@ -250,7 +263,8 @@ fn what_belongs_to_another_program_is_not_taken_over() {
 /// The same lines with the same seed are the same session; no stream of random numbers is used twice.
 #[test]
 fn sessions_replay() {
-    let lines = [":flip @slope", ":infer mh(one(@**)) 100", ":infer mh(one(@**)) 100", ":trace", "next", ":draw", ":trace"];
+    let lines =
+        [":flip @slope", ":infer mh(one(@**)) 100", ":infer mh(one(@**)) 100", ":trace", "next", ":draw", ":trace"];
     let run = || {
         let mut s = line();
         lines.map(|l| says(&mut s, l))
@@ -269,7 +283,10 @@ fn plans_of_all_kinds_run() {
     assert!(says(&mut s, ":infer quick").starts_with("quick: 25 steps"));
     assert!(says(&mut s, ":infer quick 7").starts_with("quick: 7 steps"));
     let text = s.text().to_owned();
-    assert!(says(&mut s, "infer { warmup 10 { drift(@slope); } repeat 12 { drift(@slope); } }").contains("12 steps after 10 of warm-up"));
+    assert!(
+        says(&mut s, "infer { warmup 10 { drift(@slope); } repeat 12 { drift(@slope); } }")
+            .contains("12 steps after 10 of warm-up")
+    );
     assert_eq!(s.text(), text, "a block without a name is no part of the program");
     assert!(says(&mut s, ":infer { repeat 5 { gibbs(@wide); } }").starts_with("infer { … }: 5 steps"));
     says(&mut s, "kernel both() { mh(one(@**)); drift(one($continuous)); }");
@@ -361,7 +378,9 @@ fn a_program_without_its_data_is_its_prior() {
 
 #[test]
 fn words_are_completed_where_they_stand() {
-    let mut s = session("fn spin(angle, speed = 2) { angle * speed } assume xs ~ iid(normal(0, 1), 3) #fast; observe normal(xs[0], 1) = 1 as seen;");
+    let mut s = session(
+        "fn spin(angle, speed = 2) { angle * speed } assume xs ~ iid(normal(0, 1), 3) #fast; observe normal(xs[0], 1) = 1 as seen;",
+    );
     let words = |s: &Session, line: &str| {
         let found = s.complete(line, line.len());
         (line[found.start..].to_owned(), found.words)

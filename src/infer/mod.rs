@@ -25,9 +25,9 @@ mod state;
 
 pub use chains::run_chains;
 pub use default_plan::default_plan;
+pub(crate) use force::put as force;
 pub(crate) use init::attempts;
 pub use init::{Start, StartError, starts};
-pub(crate) use force::put as force;
 pub(crate) use kernel::accepts;
 pub use kernel::{At, Kernel, Outcome, Pick, Scope};
 pub use kernels::{

@@ -29,5 +29,5 @@ pub use moments::{Moments, Point};
 pub use number::{number, seconds};
 pub use rundir::{RunDir, RunDirError};
 pub use sinks::{Memory, Tee};
-pub use whole::write_file;
 pub use warnings::warnings;
+pub use whole::write_file;

@@ -89,7 +89,9 @@ impl Session {
         if !name.starts_with('@') {
             return match self.is_param(name) {
                 true => self.set_param(name, value),
-                false => Err(Trouble::plain(format!("there is no param `{name}`")).hint("choices have addresses: @name")),
+                false => {
+                    Err(Trouble::plain(format!("there is no param `{name}`")).hint("choices have addresses: @name"))
+                }
             };
         }
         let value = self.value_of(value)?;

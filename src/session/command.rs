@@ -27,7 +27,11 @@ pub const COMMANDS: &[Command] = &[
     command("set", "@a VALUE", "Give a choice, an observation (`@y`) or a param (`n`) another value"),
     command("draw", "", "Draw everything anew from the prior"),
     command("undo", "", "Go back to before the last change"),
-    command("infer", "[PLAN] [N] [&]", "Run the program's plan, a named one, `{ … }` or a kernel; with & in the background"),
+    command(
+        "infer",
+        "[PLAN] [N] [&]",
+        "Run the program's plan, a named one, `{ … }` or a kernel; with & in the background",
+    ),
     command("status", "", "What runs in the background, or ran last"),
     command("wait", "", "Wait until what runs in the background is done"),
     command("stop", "", "End what runs in the background and take over its state"),

@@ -17,9 +17,9 @@ pub struct Completion {
 
 /// The words of the language.
 const KEYWORDS: &[&str] = &[
-    "assume", "let", "observe", "predict", "factor", "force", "freeze", "forget", "sample", "param", "data", "include", "fn", "kernel",
-    "infer", "report", "export", "for", "if", "else", "and", "or", "not", "true", "false", "warmup", "repeat", "mix", "every",
-    "collect", "propose",
+    "assume", "let", "observe", "predict", "factor", "force", "freeze", "forget", "sample", "param", "data", "include",
+    "fn", "kernel", "infer", "report", "export", "for", "if", "else", "and", "or", "not", "true", "false", "warmup",
+    "repeat", "mix", "every", "collect", "propose",
 ];
 /// The tags that choices have by their distributions.
 const KINDS: &[&str] = &["$continuous", "$discrete", "$finite", "$gaussian"];
@@ -65,18 +65,24 @@ impl Session {
             let is_program = before[..start - 1].trim_end().ends_with("include");
             let reads = |name: &&str| before[..start - 1].trim_end().trim_end_matches('(').ends_with(*name);
             return match is_program || READERS.iter().any(|name| reads(name)) {
-                true => found(start, &before[start..], files(&before[start..], if is_program { &[".pcad"] } else { &[] })),
+                true => {
+                    found(start, &before[start..], files(&before[start..], if is_program { &[".pcad"] } else { &[] }))
+                }
                 false => Completion::default(),
             };
         }
         let part_of_address = |c: char| c.is_alphanumeric() || "@_/[]#*\".-".contains(c);
-        let start = before.rfind(|c: char| !part_of_address(c)).map_or(0, |i| i + before[i..].chars().next().map_or(1, char::len_utf8));
+        let start = before
+            .rfind(|c: char| !part_of_address(c))
+            .map_or(0, |i| i + before[i..].chars().next().map_or(1, char::len_utf8));
         if before[start..].contains('@') {
             let start = start + before[start..].rfind('@').unwrap_or(0);
             return found(start, &before[start..], self.addresses());
         }
         let part_of_name = |c: char| c.is_alphanumeric() || c == '_' || c == '.' || c == '$';
-        let start = before.rfind(|c: char| !part_of_name(c)).map_or(0, |i| i + before[i..].chars().next().map_or(1, char::len_utf8));
+        let start = before
+            .rfind(|c: char| !part_of_name(c))
+            .map_or(0, |i| i + before[i..].chars().next().map_or(1, char::len_utf8));
         let word = &before[start..];
         if word.starts_with('$') {
             let tags = self.model.code().tags.iter().map(|t| format!("${t}"));
@@ -148,8 +154,10 @@ fn open_string(before: &str) -> Option<usize> {
 
 /// The name of the function whose arguments a text ends in.
 fn enclosing_call(before: &str) -> Option<String> {
-    let hidden: Vec<_> =
-        classes(before).into_iter().filter(|(_, c)| matches!(c, Class::String | Class::Comment | Class::Address)).collect();
+    let hidden: Vec<_> = classes(before)
+        .into_iter()
+        .filter(|(_, c)| matches!(c, Class::String | Class::Comment | Class::Address))
+        .collect();
     let mut depth = 0;
     for (i, c) in before.char_indices().rev() {
         if hidden.iter().any(|(r, _)| r.contains(&i)) {
@@ -159,9 +167,9 @@ fn enclosing_call(before: &str) -> Option<String> {
             ')' | ']' | '}' => depth += 1,
             '(' if depth == 0 => {
                 let head = before[..i].trim_end();
-                let start = head.rfind(|c: char| !(c.is_alphanumeric() || c == '_' || c == '.')).map_or(0, |j| {
-                    j + head[j..].chars().next().map_or(1, char::len_utf8)
-                });
+                let start = head
+                    .rfind(|c: char| !(c.is_alphanumeric() || c == '_' || c == '.'))
+                    .map_or(0, |j| j + head[j..].chars().next().map_or(1, char::len_utf8));
                 return Some(head[start..].to_owned()).filter(|n| !n.is_empty());
             }
             '(' | '[' | '{' => depth -= 1,

@@ -114,7 +114,8 @@ impl Session {
         // What the command line says goes before the default.
         let program = match declared.and_then(|d| d.default.as_ref()) {
             Some(e) if !self.program.is_set(name) => {
-                let (before, after) = (self.text().get(..e.span.start as usize), self.text().get(e.span.end as usize..));
+                let (before, after) =
+                    (self.text().get(..e.span.start as usize), self.text().get(e.span.end as usize..));
                 let text = format!("{}{value}{}", before.unwrap_or_default(), after.unwrap_or_default());
                 self.program.edited(&text)?
             }

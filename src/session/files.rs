@@ -36,8 +36,9 @@ impl Session {
         let (mut said, mut trace) = (note.text, loaded.trace);
         if let Some(saved) = saved_trace(Path::new(&path))? {
             let code = Arc::clone(loaded.model.code());
-            trace = Trace::load(code, loaded.model.hash(), &saved, self.limits)
-                .map_err(|e| Trouble::plain(format!("{path}: {e}")).hint("without that file the program loads alone"))?;
+            trace = Trace::load(code, loaded.model.hash(), &saved, self.limits).map_err(|e| {
+                Trouble::plain(format!("{path}: {e}")).hint("without that file the program loads alone")
+            })?;
             said += &format!("with the trace of {path}\n");
         }
         (self.program, self.model, self.trace) = (loaded.program, loaded.model, trace);

@@ -74,7 +74,15 @@ mod tests {
         sink.columns(&[Column::scalar("x")]).unwrap();
         for (draw, log_joint) in [-3.0, -1.0, -1.0, -2.0].into_iter().enumerate() {
             let draw = draw as u64;
-            let row = DrawRow { chain: 1, draw, step: draw, log_joint, log_prior: 0.0, log_likelihood: 0.0, values: vec![0.5] };
+            let row = DrawRow {
+                chain: 1,
+                draw,
+                step: draw,
+                log_joint,
+                log_prior: 0.0,
+                log_likelihood: 0.0,
+                values: vec![0.5],
+            };
             sink.draw(&row).unwrap();
         }
         let seen = kept.seen();

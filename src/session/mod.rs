@@ -175,7 +175,9 @@ impl Session {
         };
         let key = StreamKey::new(self.seed, 0, Purpose::START);
         let (mut impossible, mut failure) = (None, None);
-        for (kept, note) in [(kept, ""), (&[][..], "note: the choices so far lead to no value, so all were drawn anew\n")] {
+        for (kept, note) in
+            [(kept, ""), (&[][..], "note: the choices so far lead to no value, so all were drawn anew\n")]
+        {
             for lane in 0..ATTEMPTS {
                 let draws = Draws { key, step: self.clock, lane };
                 match Trace::generate(Arc::clone(&code), kept.iter().cloned(), draws, self.limits) {

@@ -66,8 +66,9 @@ impl Session {
         words.truncate(words.len() - usize::from(file.is_some()));
         let draws = self.looks();
         let operand = match words[..] {
-            [] => bank::picture(&mut self.trace, draws)
-                .ok_or_else(|| Trouble::plain("the program has no view and no solid").hint("let view = scene.render(solid);"))?,
+            [] => bank::picture(&mut self.trace, draws).ok_or_else(|| {
+                Trouble::plain("the program has no view and no solid").hint("let view = scene.render(solid);")
+            })?,
             [name] => self.global(name)?,
             _ => return Err(Trouble::plain("`:render` takes a name and a file that ends in .png")),
         };
@@ -95,7 +96,9 @@ impl Session {
 /// The first photograph among a program's data.
 fn photo(code: &Code) -> Option<Arc<RgbImage>> {
     let of = |o: &Operand| match o {
-        Operand::Const(i) => code.const_value(*i).downcast::<ImageValue>()?.as_photo().map(|p| Arc::new(p.rgb().clone())),
+        Operand::Const(i) => {
+            code.const_value(*i).downcast::<ImageValue>()?.as_photo().map(|p| Arc::new(p.rgb().clone()))
+        }
         _ => None,
     };
     code.globals.values().find_map(of)

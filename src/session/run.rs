@@ -301,7 +301,8 @@ impl Session {
         let Some(last) = &self.last else { return Err(Trouble::plain("nothing has run yet").hint(":infer")) };
         let mut text = last.line();
         let rate = (last.steps + last.warmup) as f64 / last.seconds;
-        text += &format!("{}, {} steps a second\n\n{}", seconds(last.seconds), number(rate), table::kernels(&last.kernels));
+        text +=
+            &format!("{}, {} steps a second\n\n{}", seconds(last.seconds), number(rate), table::kernels(&last.kernels));
         let sites = table::sites(&last.sites);
         if !sites.is_empty() {
             text += &format!("\n{sites}");

@@ -147,10 +147,19 @@ mod tests {
 
     #[test]
     fn directives_and_expressions() {
-        for text in ["let a = 1", "x ~ normal(0, 1)", "t[1] ~ flip(0.5)", "f(1);", "a = 3", "fn f() { 1 }", "infer { }"] {
+        for text in ["let a = 1", "x ~ normal(0, 1)", "t[1] ~ flip(0.5)", "f(1);", "a = 3", "fn f() { 1 }", "infer { }"]
+        {
             assert!(is_directive(text), "{text}");
         }
-        for text in ["f(1)", "fn(x) { let y = x; y }", "a == 3", "f(x = 2)", "{ a: 1 }", "@x", "if a { let b = 1; b } else { 2 }"] {
+        for text in [
+            "f(1)",
+            "fn(x) { let y = x; y }",
+            "a == 3",
+            "f(x = 2)",
+            "{ a: 1 }",
+            "@x",
+            "if a { let b = 1; b } else { 2 }",
+        ] {
             assert!(!is_directive(text), "{text}");
         }
     }

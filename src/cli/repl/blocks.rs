@@ -86,7 +86,10 @@ mod tests {
 
     #[test]
     fn the_nearest_of_256() {
-        assert_eq!([nearest(0, 0, 0), nearest(255, 255, 255), nearest(255, 0, 0), nearest(95, 135, 175)], [16, 231, 196, 67]);
+        assert_eq!(
+            [nearest(0, 0, 0), nearest(255, 255, 255), nearest(255, 0, 0), nearest(95, 135, 175)],
+            [16, 231, 196, 67]
+        );
         assert_eq!(nearest(128, 128, 128), 244);
         let sent = encode(&RgbImage::from_pixel(2, 2, Rgb([255, 0, 0])), 2, false);
         assert_eq!(sent, "\x1b[38;5;196;48;5;196m▀▀\x1b[0m\n");

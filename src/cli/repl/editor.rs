@@ -166,6 +166,8 @@ mod tests {
             }
             assert_eq!(plain, line);
         }
-        assert!(colored("let x = 1").contains("\x1b[1;35mlet\x1b[0m") && colored(":flip @x").contains("\x1b[33m@x\x1b[0m"));
+        assert!(
+            colored("let x = 1").contains("\x1b[1;35mlet\x1b[0m") && colored(":flip @x").contains("\x1b[33m@x\x1b[0m")
+        );
     }
 }

@@ -60,8 +60,15 @@ fn open(a: &Repl, stop: Stop) -> Result<(Session, Reply), Failure> {
 
 /// What the program is given, as `run` has it.
 fn job(a: &Repl, path: &str) -> Job {
-    let sampling =
-        Sampling { seed: a.seed, chains: 1, threads: None, steps: None, warmup: None, time: None, no_incremental: false };
+    let sampling = Sampling {
+        seed: a.seed,
+        chains: 1,
+        threads: None,
+        steps: None,
+        warmup: None,
+        time: None,
+        no_incremental: false,
+    };
     Job {
         given: Given { program: path.to_owned(), sets: a.sets.clone(), camera: a.camera.clone() },
         observe: a.observe.clone(),

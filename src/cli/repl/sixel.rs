@@ -122,7 +122,9 @@ mod tests {
                 c => {
                     let bits = c as u8 - 63;
                     for _ in 0..run.take().unwrap_or(1) {
-                        (0..6).filter(|y| bits >> y & 1 == 1).for_each(|y| picture[(top + y) * width + x] = Some(color));
+                        (0..6)
+                            .filter(|y| bits >> y & 1 == 1)
+                            .for_each(|y| picture[(top + y) * width + x] = Some(color));
                         x += 1;
                     }
                 }
