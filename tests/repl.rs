@@ -200,7 +200,7 @@ fn on_a_terminal() {
     p.exp_string("a solid").unwrap();
     p.exp_string(prompt).unwrap();
     p.send_line(":render").unwrap();
-    p.exp_regex("\u{1b}\\[38;2;[0-9;]+m▀").unwrap();
+    p.exp_regex("\u{1b}\\[38;2;[0-9]+;[0-9]+;[0-9]+;48;2;").unwrap();
     p.exp_string(prompt).unwrap();
     p.send_control('d').unwrap();
     p.exp_eof().unwrap();

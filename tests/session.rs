@@ -475,3 +475,33 @@ fn scenes_are_seen() {
     assert!(refuses(&mut s, ":render bal").contains("did you mean `ball`?"));
     assert!(refuses(&mut Session::new(1, None).unwrap(), ":render").contains("no view"));
 }
+
+/// Names that are asked for by nobody but the session are kept up to date as observations are.
+#[test]
+fn shipped_programs_are_at_home() {
+    for name in [
+        "coin.pcad",
+        "linreg.pcad",
+        "mixture.pcad",
+        "crp.pcad",
+        "geometric.pcad",
+        "scene.pcad",
+        "lathe.pcad",
+        "human_kth.pcad",
+    ] {
+        let program = Program::open(name).unwrap_or_else(|e| panic!("{e}"));
+        let mut s = Session::open(program, 1, None).unwrap_or_else(|e| panic!("{name}: {e}")).0;
+        let addresses: Vec<String> = s.trace().choices().iter().map(|(a, ..)| a.to_string()).collect();
+        assert!(!addresses.is_empty(), "{name} has no choices");
+        for (i, a) in addresses.iter().cycle().step_by(7).take(12).enumerate() {
+            if s.trace().find(&a.parse().unwrap()).is_some() {
+                says(&mut s, &format!(":why {a}"));
+                says(&mut s, &format!(":flip {}", if i % 5 == 4 { "@**" } else { a }));
+            }
+            let (now, anew) = (s.trace().log_joint(), s.trace().rerun().unwrap().log_joint());
+            assert_eq!(now.to_bits(), anew.to_bits(), "{name} {a}: {now} {anew}");
+        }
+        says(&mut s, ":infer mh(one(@**)) 30");
+        assert_eq!(s.trace().log_joint().to_bits(), s.trace().rerun().unwrap().log_joint().to_bits(), "{name}");
+    }
+}
