@@ -9,6 +9,8 @@
 //! # Ok::<(), pcadlang::Error>(())
 //! ```
 
+mod edited;
+
 use crate::diag::{Diagnostic, IntoDiagnostic, Severity, SourceMap, render};
 use crate::host::Host;
 use crate::infer::draws::Sink;
@@ -16,7 +18,7 @@ use crate::infer::{ChainError, ChainResult, Progress, RunOptions, default_plan, 
 use crate::lang::builtins::data::Options;
 use crate::lang::builtins::scene::{CameraValue, DepthValue, ImageValue, KeypointsValue, MaskValue};
 use crate::lang::builtins::{Table, data};
-use crate::lang::code::Code;
+use crate::lang::code::{Code, Eager};
 use crate::lang::error::{Fault, FaultKind, RunError};
 use crate::lang::load::{Disk, Loaded, Loader, Nowhere, load, load_text, read, reason};
 use crate::lang::lower::{Compiled, Export, Inputs, Interface, Report, compile, inspect};
@@ -25,14 +27,14 @@ use crate::platform::clock;
 use crate::render::Camera;
 use crate::report::{ChainDraws, Memory, Quantity, bytes_hash, quantities, text_hash};
 use crate::rng::{Purpose, StreamKey};
-use crate::syntax::ast::KStmt;
+use crate::syntax::ast::{ItemKind, KStmt};
 use crate::syntax::parse;
 use crate::trace::{Draws, Limits, Trace};
 use indexmap::IndexMap;
 use rustc_hash::FxHashMap;
 use std::cell::RefCell;
 use std::fmt;
-use std::sync::Arc;
+use std::sync::{Arc, Mutex, PoisonError};
 
 /// What is wrong with a program, its data, or a run of it: messages with their places.
 #[derive(Clone)]
@@ -81,17 +83,24 @@ impl IntoDiagnostic for RunError {
 /// The argument that the run's camera stands in for.
 const RENDER: (&str, &str) = ("scene.render", "camera");
 
-/// A program on its way to a [`Model`]: loaded, its inputs not yet given.
+/// Files of data that a program has read, with their hashes, by kind, path and how they were read.
+type Files = Arc<Mutex<FxHashMap<(String, String, String), (Value, String)>>>;
+
+/// A program on its way to a [`Model`]: loaded, its inputs not yet given. A clone can go another way: both keep what they read.
+#[derive(Clone)]
 pub struct Program {
     loaded: Loaded,
     sources: SourceMap,
-    loader: Box<dyn Loader>,
+    loader: Arc<dyn Loader + Send + Sync>,
+    name: String,
     text: String,
     sets: Vec<(String, String)>,
     data: IndexMap<String, Value>,
     defaults: FxHashMap<(String, String), Value>,
     needs_data: bool,
+    eager: Eager,
     builtins: Arc<Table>,
+    files: Files,
 }
 
 impl Program {
@@ -102,7 +111,7 @@ impl Program {
     pub fn open(path: &str) -> Result<Program, Error> {
         let mut sources = SourceMap::new();
         match load(path, &Disk, &mut sources) {
-            Ok(loaded) => Ok(Program::new(loaded, sources, Box::new(Disk))),
+            Ok(loaded) => Ok(Program::new(path, loaded, sources, Arc::new(Disk))),
             Err(diagnostics) => Err(Error { diagnostics, sources }),
         }
     }
@@ -112,26 +121,41 @@ impl Program {
     /// # Errors
     /// If it does not parse.
     pub fn parse(text: &str) -> Result<Program, Error> {
+        Program::read("<program>", text, Arc::new(Nowhere))
+    }
+
+    /// A program from its text, which stands for a file of this name: what it includes and reads is found from there.
+    ///
+    /// # Errors
+    /// As [`Program::open`].
+    pub fn named(name: &str, text: &str) -> Result<Program, Error> {
+        Program::read(name, text, Arc::new(Disk))
+    }
+
+    fn read(name: &str, text: &str, loader: Arc<dyn Loader + Send + Sync>) -> Result<Program, Error> {
         let mut sources = SourceMap::new();
-        match load_text("<program>", text, &Nowhere, &mut sources) {
-            Ok(loaded) => Ok(Program::new(loaded, sources, Box::new(Nowhere))),
+        match load_text(name, text, &*loader, &mut sources) {
+            Ok(loaded) => Ok(Program::new(name, loaded, sources, loader)),
             Err(diagnostics) => Err(Error { diagnostics, sources }),
         }
     }
 
-    fn new(loaded: Loaded, sources: SourceMap, loader: Box<dyn Loader>) -> Program {
+    fn new(name: &str, loaded: Loaded, sources: SourceMap, loader: Arc<dyn Loader + Send + Sync>) -> Program {
         let text =
             loaded.units.first().and_then(|u| sources.get(u.file)).map_or(String::new(), |f| f.text().to_string());
         Program {
             loaded,
             sources,
             loader,
+            name: name.to_owned(),
             text,
             sets: Vec::new(),
             data: IndexMap::new(),
             defaults: FxHashMap::default(),
             needs_data: true,
+            eager: Eager::default(),
             builtins: Arc::new(Table::default()),
+            files: Files::default(),
         }
     }
 
@@ -140,9 +164,20 @@ impl Program {
         inspect(&self.loaded)
     }
 
+    /// The name of its main file.
+    pub fn name(&self) -> &str {
+        &self.name
+    }
+
     /// The text of its main file.
     pub fn text(&self) -> &str {
         &self.text
+    }
+
+    /// The `data` items that have no value yet.
+    pub fn missing_data(&self) -> Vec<String> {
+        let open = self.interface().data.into_iter().filter(|d| !d.has_default && !self.data.contains_key(&d.name));
+        open.map(|d| d.name).collect()
     }
 
     /// A hash of its text, that of the files it includes, and the parameters set so far: that of the model it gives.
@@ -159,8 +194,14 @@ impl Program {
     /// Sets a `param`, its value written as in a program.
     #[must_use]
     pub fn set(mut self, name: &str, value: &str) -> Program {
+        self.sets.retain(|(n, _)| n != name);
         self.sets.push((name.into(), value.into()));
         self
+    }
+
+    /// Whether a `param` was set.
+    pub fn is_set(&self, name: &str) -> bool {
+        self.sets.iter().any(|(n, _)| n == name)
     }
 
     /// Gives a `data` item.
@@ -212,6 +253,13 @@ impl Program {
         self
     }
 
+    /// Says what is to run although nothing asks for it.
+    #[must_use]
+    pub fn eager(mut self, eager: Eager) -> Program {
+        self.eager = eager;
+        self
+    }
+
     /// The camera of views that name none.
     #[must_use]
     pub fn camera(self, camera: Camera) -> Program {
@@ -251,18 +299,24 @@ impl Program {
     /// Everything that is wrong with it.
     pub fn compile(mut self) -> Result<Model, Error> {
         self.default_camera();
-        let loader = &*self.loader;
+        let (loader, files) = (&*self.loader, &*self.files);
         let data_hash = RefCell::new(String::new());
         let read_data = |kind: &str, path: &str, folder: &str, options: &Options| {
             let beside = format!("{folder}{path}");
-            let file = data::path_of(kind, &beside);
-            match read(loader, file) {
-                Ok((bytes, _)) => {
-                    data_hash.borrow_mut().push_str(&bytes_hash(&bytes));
-                    data::load(kind, &beside, &bytes, options, &|other| sibling(loader, &beside, other))
-                }
-                Err(e) => Err(Fault::new(FaultKind::Other, format!("cannot read {file}: {}", reason(&e)))),
+            let key = (kind.to_owned(), beside.clone(), format!("{options:?}"));
+            let mut files = files.lock().unwrap_or_else(PoisonError::into_inner);
+            if let Some((value, hash)) = files.get(&key) {
+                data_hash.borrow_mut().push_str(hash);
+                return Ok(value.clone());
             }
+            let file = data::path_of(kind, &beside);
+            let (bytes, _) = read(loader, file)
+                .map_err(|e| Fault::new(FaultKind::Other, format!("cannot read {file}: {}", reason(&e))))?;
+            let value = data::load(kind, &beside, &bytes, options, &|other| sibling(loader, &beside, other))?;
+            let hash = bytes_hash(&bytes);
+            data_hash.borrow_mut().push_str(&hash);
+            files.insert(key, (value.clone(), hash));
+            Ok(value)
         };
         let inputs = Inputs {
             builtins: Arc::clone(&self.builtins),
@@ -271,6 +325,7 @@ impl Program {
             read: &read_data,
             needs_data: self.needs_data,
             defaults: self.defaults,
+            eager: self.eager,
         };
         match compile(&self.loaded, inputs, &mut self.sources) {
             Ok(compiled) => {
@@ -426,7 +481,7 @@ impl Model {
         let file = sources.add("<default plan>", &text);
         let (program, _) = parse(&text, file);
         let body = program.items.into_iter().find_map(|i| match i.kind {
-            crate::syntax::ast::ItemKind::Infer { body, .. } => Some(body),
+            ItemKind::Infer { body, .. } => Some(body),
             _ => None,
         });
         Ok((body.unwrap_or_default().into(), Some(text)))

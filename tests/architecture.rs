@@ -45,6 +45,13 @@ fn modules_depend_one_way() {
         ("infer", &["infer", "trace", "lang", "syntax", "diag", "dist", "num", "platform", "rng"]),
         ("host", &["host", "infer", "lang", "syntax", "diag", "dist", "render", "rng", "Error"]),
         ("report", &["report", "infer", "num"]),
+        (
+            "session",
+            &[
+                "session", "bank", "Model", "model", "report", "infer", "trace", "lang", "syntax", "diag", "geom",
+                "render", "rng",
+            ],
+        ),
         ("bank", &["bank", "Model", "report", "infer", "trace", "lang", "dist", "render", "vision", "num", "rng"]),
     ];
     let mut seen = 0;

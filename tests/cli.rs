@@ -76,7 +76,7 @@ fn doc() {
 
 #[test]
 fn help() {
-    let all: [&[&str]; 10] = [
+    let all: [&[&str]; 11] = [
         &["--help"],
         &["run", "--help"],
         &["evaluate", "--help"],
@@ -86,6 +86,7 @@ fn help() {
         &["predict", "--help"],
         &["contours", "--help"],
         &["doc", "--help"],
+        &["repl", "--help"],
         &["--version"],
     ];
     sessions("help", &all);

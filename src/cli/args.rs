@@ -32,6 +32,8 @@ pub enum Command {
     Contours(Contours),
     /// Explain a built-in, or list all of them
     Doc(Doc),
+    /// Explore a program at a prompt: `:help` there lists what can be done
+    Repl(Repl),
 }
 
 /// What a program is given.
@@ -303,6 +305,58 @@ pub struct Contours {
 pub struct Doc {
     /// The name of a built-in; all of them, as Markdown, if left out
     pub name: Option<String>,
+}
+
+/// `repl`.
+#[derive(Args, Debug)]
+#[command(after_help = PROMPT)]
+pub struct Repl {
+    /// The program to begin with: a file, or the name of a shipped one; an empty one if left out
+    #[arg(value_name = "PROG")]
+    pub program: Option<String>,
+    /// Set a `param`, its value as in a program; may be repeated
+    #[arg(long = "set", value_name = "NAME=VALUE", value_parser = pair, requires = "program")]
+    pub sets: Vec<(String, String)>,
+    /// The camera, as a JSON file
+    #[arg(long, value_name = "FILE", requires = "program")]
+    pub camera: Option<PathBuf>,
+    /// A file for a `data` item; the name may be left out if there is only one that fits
+    #[arg(long, value_name = "[NAME=]FILE", requires = "program")]
+    pub observe: Vec<String>,
+    /// What a pose detector found: a file for the only `data` item of keypoints
+    #[arg(long, value_name = "FILE[#ID]", requires = "program")]
+    pub keypoints: Option<String>,
+    /// The seed: the same lines with the same seed give the same session
+    #[arg(long, default_value_t = 1)]
+    pub seed: u64,
+    /// How pictures are shown; told from the environment if left out
+    #[arg(long, value_enum)]
+    pub graphics: Option<Graphics>,
+    /// Show what is read with its prompt, and go on after errors: a recording of a session
+    #[arg(long)]
+    pub transcript: bool,
+}
+
+/// What `repl` does with its input.
+const PROMPT: &str = "\
+On a terminal there are editing, history and completion (Tab). What is piped in runs as a script: exit code 1 at the first
+error. Ctrl-C clears the line, or ends what is under way and leaves everything as it was; Ctrl-D leaves.";
+
+/// Ways to show a picture.
+#[derive(Clone, Copy, Debug, PartialEq, Eq, clap::ValueEnum)]
+pub enum Graphics {
+    /// The protocol of kitty and ghostty
+    Kitty,
+    /// That of iTerm2 and WezTerm
+    Iterm,
+    /// Sixels: xterm, foot, mlterm, mintty
+    Sixel,
+    /// Half blocks in 24-bit colours
+    Blocks,
+    /// Half blocks in 256 colours
+    Blocks256,
+    /// A file
+    File,
 }
 
 fn pair(text: &str) -> Result<(String, String), String> {

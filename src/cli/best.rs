@@ -8,10 +8,11 @@ use image::GrayImage;
 use pcadlang::Model;
 use pcadlang::geom::{Mesh, Solid, glb, obj};
 use pcadlang::infer::ChainResult;
-use pcadlang::lang::builtins::scene::{SolidValue, ViewValue};
+use pcadlang::lang::builtins::scene::ViewValue;
 use pcadlang::render::View;
 use pcadlang::report::pictures::{self, png};
 use pcadlang::report::{RunDir, npy};
+use pcadlang::session::{exported, exported_operand, over, strokes};
 use pcadlang::trace::{Limits, Trace};
 use pcadlang::vision::Photo;
 use std::sync::Arc;
@@ -78,14 +79,9 @@ fn draw(
         write(dir, "mask.png", &encode(png(&mask))?)?;
     }
     let large = pictures::picture_size(width, height);
-    let (contours, picture) = (view.contours(size), view.frame(large.0.max(large.1)));
-    let (strokes, drawn) = (scene::strokes(&contours), scene::drawn(&picture));
-    let mut over = pictures::overlay(photo.map(Photo::rgb), &drawn, &strokes);
-    let marked = ViewValue(Arc::clone(view));
-    let joints: Vec<[f64; 2]> = marked.landmarks(width, height).filter_map(|(_, at)| at).collect();
-    pictures::dots(&mut over, (width, height), &joints);
+    let over = over(view, photo.map(Photo::rgb), (width, height));
     let overlay = encode(png(&over))?;
-    let lines = encode(png(&pictures::contours(frame.width, frame.height, &strokes)))?;
+    let lines = encode(png(&pictures::contours(frame.width, frame.height, &strokes(&view.contours(size)))))?;
     write(dir, "overlay.png", &overlay)?;
     write(dir, "contours.png", &lines)?;
     if let Some(p) = photo {
@@ -141,26 +137,15 @@ fn export(
     x: &pcadlang::lang::lower::Export,
     seed: u64,
 ) -> Result<(), Failure> {
-    use pcadlang::syntax::ast::ExprKind;
-    let expr = match &x.expr.kind {
-        ExprKind::Call { args, .. } if args.len() == 1 => &args[0].value,
-        _ => &x.expr,
-    };
-    let Some(operand) = model.code().queries.get(&expr.span).or_else(|| model.code().queries.get(&x.expr.span)) else {
-        return Ok(());
-    };
-    let values =
-        trace.query(&[*operand], scene::predictive(seed, 2)).map_err(|e| Failure::from(model.run_error(*e)))?;
+    let Some(operand) = exported_operand(model.code(), x) else { return Ok(()) };
+    let values = trace.query(&[operand], scene::predictive(seed, 2)).map_err(|e| Failure::from(model.run_error(*e)))?;
     let Some(value) = values.first() else { return Ok(()) };
-    let solid = value.downcast::<ViewValue>().map(|v| v.0.solid().clone());
-    let solid = solid.or_else(|| value.downcast::<SolidValue>().map(|s| s.0.clone()));
-    let name = x.file.trim_start_matches(['/', '.']);
-    match solid {
-        Some(solid) => {
-            let Some(mesh) = mesh(&solid) else { return Ok(()) };
-            let bytes = if name.ends_with(".glb") { glb::write(&mesh) } else { obj::write(&mesh).into_bytes() };
-            write(dir, &name.replace('/', "_"), &bytes)
+    let name = x.file.trim_start_matches(['/', '.']).replace('/', "_");
+    match exported(value, &name) {
+        Ok(bytes) => write(dir, &name, &bytes),
+        Err(e) => {
+            eprintln!("warning: no mesh is written: {e}");
+            Ok(())
         }
-        None => write(dir, &name.replace('/', "_"), value.to_string().as_bytes()),
     }
 }

@@ -15,6 +15,7 @@ mod keypoints;
 mod learn;
 mod predict;
 mod progress;
+mod repl;
 mod run;
 mod sample;
 mod scene;
@@ -70,6 +71,7 @@ pub fn main(cli: Cli) -> ExitCode {
         Command::Predict(a) => predict::predict(&a),
         Command::Contours(a) => contours::contours(&a),
         Command::Doc(a) => doc::doc(&a),
+        Command::Repl(a) => repl::repl(&a),
     };
     match done {
         Ok(()) => ExitCode::SUCCESS,

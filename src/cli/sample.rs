@@ -5,6 +5,7 @@ use super::{Failure, files, given, plain, scene};
 use pcadlang::lang::value::Value;
 use pcadlang::report::pictures::{contact_sheet, png, shaded};
 use pcadlang::report::{number, table};
+use pcadlang::session::drawn;
 use pcadlang::trace::{Limits, Trace};
 use std::sync::Arc;
 
@@ -18,7 +19,7 @@ pub fn sample(a: &Sample) -> Result<(), Failure> {
         let mut trace = Trace::prior(Arc::clone(model.code()), Limits::default());
         let view = scene::view(&mut trace, draws, None);
         match view {
-            Some(view) => pictures.push(shaded(&scene::drawn(&view.frame(a.size)))),
+            Some(view) => pictures.push(shaded(&drawn(&view.frame(a.size)))),
             None => {
                 let mut row = vec![(i + 1).to_string()];
                 for (name, o) in &model.code().assumed {

@@ -4,8 +4,7 @@ use pcadlang::bank;
 use pcadlang::lang::builtins::scene::ViewValue;
 use pcadlang::lang::code::Operand;
 use pcadlang::lang::value::Value;
-use pcadlang::render::{Camera, Contours, Frame, View};
-use pcadlang::report::pictures::{Drawn, Strokes};
+use pcadlang::render::{Camera, View};
 use pcadlang::rng::{Purpose, StreamKey};
 use pcadlang::trace::{Draws, Trace};
 use std::sync::Arc;
@@ -27,14 +26,4 @@ pub fn view(trace: &mut Trace, draws: Draws, camera: Option<Camera>) -> Option<A
     let at = bank::picture(trace, draws)?;
     let values = trace.query(&[at], draws).ok()?;
     bank::as_view(values.first()?, camera)
-}
-
-/// A frame as the reports want it.
-pub fn drawn(f: &Frame) -> Drawn<'_> {
-    Drawn { width: f.width, height: f.height, depth: &f.depth, normal: &f.normal, part: &f.part }
-}
-
-/// Contours as the reports want them.
-pub fn strokes(c: &Contours) -> Strokes<'_> {
-    Strokes { width: c.width, height: c.height, x: &c.x, y: &c.y, tx: &c.tx, ty: &c.ty, length: &c.length }
 }

@@ -2,7 +2,7 @@
 
 use super::plan::RunOptions;
 use super::selection::fail;
-use crate::lang::code::Code;
+use crate::lang::code::{Code, Force};
 use crate::lang::error::RunError;
 use crate::rng::{Purpose, StreamKey};
 use crate::syntax::ast;
@@ -20,7 +20,15 @@ pub(crate) fn apply(
     chain: u32,
 ) -> Result<(), Box<RunError>> {
     let draws = Draws { key: StreamKey::new(options.seed, chain, Purpose::START), step: u64::MAX, lane: 0 };
-    for f in &code.forces {
+    put(&code.forces, trace, draws)
+}
+
+/// Applies some `force` statements of the trace's program.
+///
+/// # Errors
+/// As [`apply`].
+pub(crate) fn put(forces: &[Force], trace: &mut Trace, draws: Draws) -> Result<(), Box<RunError>> {
+    for f in forces {
         let value = trace.query(&[f.value], draws)?.swap_remove(0);
         let Some(address) = literal(&f.target) else {
             return Err(fail(f.span, "`force` needs the address of one choice, without wildcards".into()));

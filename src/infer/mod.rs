@@ -35,12 +35,14 @@ pub(crate) use crate::platform::threads::in_parallel;
 pub use chains::run_chains;
 #[doc(hidden)]
 pub use default_plan::default_plan;
+pub(crate) use force::put as force;
 #[doc(hidden)]
 pub use foreign::KernelCall;
 pub(crate) use foreign::KernelMaker;
 pub(crate) use init::attempts;
 #[doc(hidden)]
 pub use init::{Start, StartError, starts};
+pub(crate) use kernel::accepts;
 pub use kernel::{At, Kernel, Outcome, Pick, Scope, decide, recoverable};
 #[doc(hidden)]
 pub use kernels::{Abc, AbcSmc, Delayed, Hamiltonian, Hmc, Independent, Knn, Nuts, Optimize, Smc, Temper};
@@ -51,4 +53,6 @@ pub use observer::Observer;
 #[doc(hidden)]
 pub use plan::run_from;
 pub use plan::{ChainError, ChainResult, Checkpoint, Progress, RunOptions, Watch};
+#[doc(hidden)]
+pub use selection::selected;
 pub use state::StateError;

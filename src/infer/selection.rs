@@ -6,7 +6,7 @@ use crate::lang::error::{FaultKind, RunError};
 use crate::lang::key::Key;
 use crate::syntax::ast::{self, BinaryOp, Expr, ExprKind, SegmentName};
 use crate::syntax::span::Span;
-use crate::trace::{Address, AddressSegment, ChoiceKind, Pattern, PatternSegment, Selector};
+use crate::trace::{Address, AddressSegment, ChoiceKind, Draws, Pattern, PatternSegment, Selector, Trace};
 use std::sync::Arc;
 
 /// Reads a selection, with `one(…)` or `each(…)` around it or not.
@@ -28,6 +28,16 @@ fn pick(name: &str) -> Option<Pick> {
         "each" => Some(Pick::Each),
         _ => None,
     }
+}
+
+/// Reads a selection as people write it, outside of inference blocks: what keys compute they compute in this trace.
+///
+/// # Errors
+/// If the expression is not a selection, or a computed key fails.
+pub fn selected(e: &Expr, trace: &mut Trace, draws: Draws) -> Result<Selector, Box<RunError>> {
+    let code = Arc::clone(trace.code());
+    let started = crate::platform::clock::Instant::now();
+    selector(e, &mut Scope { code: &code, trace, variables: &[], draws, started, steps: 0, moved: None })
 }
 
 /// Reads a selection.

@@ -69,6 +69,20 @@ pub struct Code {
     pub queries: rustc_hash::FxHashMap<Span, Operand>,
     /// Values observed in place of what the program says, by the hash of the observation's address.
     pub observed: Arc<Observed>,
+    /// What runs although nothing asks for it.
+    pub eager: Eager,
+}
+
+/// What runs although nothing asks for it.
+#[derive(Clone, Copy, Debug, Default, PartialEq, Eq)]
+pub enum Eager {
+    /// Observations and factors: a choice that none of them asks for is not part of a trace.
+    #[default]
+    Observations,
+    /// Top-level names too (predictions aside), so that who looks at a name twice sees one value.
+    Names,
+    /// Top-level names alone: the prior, of a program whose data are not there.
+    NamesOnly,
 }
 
 /// Observed values by the hash of the observation's address.

@@ -89,7 +89,7 @@ pub fn read(loader: &dyn Loader, path: &str) -> io::Result<(Vec<u8>, bool)> {
 }
 
 /// One parsed file.
-#[derive(Debug)]
+#[derive(Clone, Debug)]
 pub struct Unit {
     /// Its number in the source map.
     pub file: FileId,
@@ -104,7 +104,7 @@ pub struct Unit {
 }
 
 /// A program with all it includes; unit 0 is the main file.
-#[derive(Debug, Default)]
+#[derive(Clone, Debug, Default)]
 pub struct Loaded {
     /// The files.
     pub units: Vec<Unit>,
@@ -142,7 +142,7 @@ pub fn load(path: &str, loader: &dyn Loader, map: &mut SourceMap) -> Result<Load
 /// As [`load`].
 pub fn load_text(name: &str, text: &str, loader: &dyn Loader, map: &mut SourceMap) -> Result<Loaded, Vec<Diagnostic>> {
     let mut loading = Loading { loader, map, loaded: Loaded::default(), errors: Vec::new(), stack: Vec::new() };
-    loading.unit(name, text.as_bytes(), false);
+    loading.unit(tidy(name), text.as_bytes(), false);
     loading.finish()
 }
 

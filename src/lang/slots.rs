@@ -1,7 +1,7 @@
 //! What follows from the operations of lowered code and updates need at hand: who reads a slot, what it reads, whether it runs
 //! although nothing asks for it, how the change of a choice spreads.
 
-use super::code::{Block, Callee, Code, Op, Operand, Slot};
+use super::code::{Block, Callee, Code, Eager, Op, Operand, Slot};
 use super::formula::Formula;
 use super::value::Value;
 
@@ -39,7 +39,7 @@ impl Code {
     /// Fills in what follows from the operations: in-block users and effects.
     pub fn finish(&mut self) {
         super::flatten::flatten(self);
-        let effects = self.find_effects();
+        let effects = self.effects();
         for (block, is_effect) in self.blocks.iter_mut().zip(effects) {
             block.effects = (0..block.ops.len() as Slot).filter(|s| is_effect[*s as usize]).collect();
             block.first = self.ops.len() as u32;
@@ -87,6 +87,25 @@ impl Code {
                 (facts.spread, facts.formula) = (spread, formula);
             }
         }
+    }
+
+    /// Marks the slots that run although nothing asks for them.
+    fn effects(&self) -> Vec<Vec<bool>> {
+        let mut effects = match self.eager {
+            Eager::NamesOnly => self.blocks.iter().map(|b| vec![false; b.ops.len()]).collect(),
+            _ => self.find_effects(),
+        };
+        if self.eager == Eager::Observations {
+            return effects;
+        }
+        let predicted = |o: &Operand| self.predictions.iter().any(|(_, p)| p == o);
+        for o in self.globals.values().filter(|o| !predicted(o)) {
+            let Operand::Local(slot) = *o else { continue };
+            // Of a container all elements: they are gathered in the slot after it.
+            let is_container = matches!(self.blocks[0].ops[slot as usize], Op::Container { .. });
+            effects[0][slot as usize + usize::from(is_container)] = true;
+        }
+        effects
     }
 
     /// Marks the slots that observe, or hold or call a block that does. Calls of function values count if any function

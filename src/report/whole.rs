@@ -23,6 +23,15 @@ pub(super) fn write_whole(folder: &Path, name: &str, bytes: &[u8]) -> io::Result
     })
 }
 
+/// Writes a file; an older one of the path is kept if that fails.
+///
+/// # Errors
+/// If it cannot be written, or the path names no file.
+pub fn write_file(path: &Path, bytes: &[u8]) -> io::Result<()> {
+    let name = path.file_name().and_then(|n| n.to_str()).ok_or(io::ErrorKind::InvalidInput)?;
+    write_whole(path.parent().unwrap_or(Path::new("")), name, bytes)
+}
+
 /// Whether a file is half of one, as [`write_whole`] names them.
 pub(super) fn is_partial(name: &str) -> bool {
     name.starts_with('.') && name.ends_with(PARTIAL)

@@ -10,6 +10,7 @@ pub mod ast;
 mod build;
 mod deep;
 mod delimiters;
+mod entry;
 mod error;
 mod expected;
 mod lexer;
@@ -22,6 +23,7 @@ mod token;
 
 pub use deep::MAX_DEPTH;
 pub use delimiters::MAX_NESTING;
+pub use entry::{Class, classes, goes_on, is_directive};
 pub use error::{AddressError, MAX_ERRORS, SyntaxError, SyntaxErrorKind};
 pub use lexer::MAX_TOKENS;
 pub use parse::{parse, parse_expr};

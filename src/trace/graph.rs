@@ -17,6 +17,7 @@ use crate::lang::value::Value;
 use crate::num::ExactSum;
 use rustc_hash::FxHashMap;
 use smallvec::SmallVec;
+use std::sync::atomic::{AtomicBool, Ordering};
 
 /// Bounds on what a program may build.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
@@ -25,13 +26,44 @@ pub struct Limits {
     pub depth: u32,
     /// Nodes of the trace.
     pub nodes: u32,
+    /// What ends an evaluation from outside.
+    pub stop: Option<Stop>,
 }
 
 impl Default for Limits {
     fn default() -> Self {
-        Limits { depth: 10_000, nodes: 200_000_000 }
+        Limits { depth: 10_000, nodes: 200_000_000, stop: None }
     }
 }
+
+/// A flag that ends an evaluation, looked at where calls and passes of loops begin; the trace is then as it was before.
+#[derive(Clone, Copy, Debug)]
+pub struct Stop(&'static AtomicBool);
+
+impl Stop {
+    /// By a flag of the host.
+    pub const fn new(flag: &'static AtomicBool) -> Self {
+        Stop(flag)
+    }
+
+    /// Sets the flag, or takes it back.
+    pub fn set(self, on: bool) {
+        self.0.store(on, Ordering::SeqCst);
+    }
+
+    /// Whether it is set.
+    pub fn is_set(self) -> bool {
+        self.0.load(Ordering::Relaxed)
+    }
+}
+
+impl PartialEq for Stop {
+    fn eq(&self, other: &Self) -> bool {
+        std::ptr::eq(self.0, other.0)
+    }
+}
+
+impl Eq for Stop {}
 
 /// The dependency graph of one execution.
 #[derive(Clone, Debug)]
@@ -205,6 +237,9 @@ impl Graph {
                 format!("the trace grew beyond {} nodes", self.limits.nodes),
                 Some("does the program loop or recurse without end?".into()),
             ));
+        }
+        if self.limits.stop.is_some_and(Stop::is_set) {
+            return Err(self.fail(code, frame.owner, FaultKind::Limit, "stopped".into(), None));
         }
         let block = frame.block as usize;
         let id = self.place_frame(code, frame);

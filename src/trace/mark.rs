@@ -150,7 +150,7 @@ impl Graph {
 
     /// Whether a marked choice may get another value without being a target: a whitened one moves with its distribution; one
     /// whose key, length or kind changes is drawn anew.
-    fn may_be_redrawn(&self, code: &Code, n: NodeId) -> bool {
+    pub(super) fn may_be_redrawn(&self, code: &Code, n: NodeId) -> bool {
         let node = &self.nodes[n as usize];
         let Op::Draw { dist, keys, .. } = self.op(code, n) else { return false };
         let stale = |o: &Operand| {

@@ -10,6 +10,7 @@ mod assign;
 mod choices;
 mod demand;
 mod eval;
+mod explain;
 mod formula;
 mod gradient;
 mod graph;
@@ -30,7 +31,8 @@ mod twin;
 
 pub use crate::lang::address::{Address, AddressSegment, AddressTextError};
 pub use choices::{Selection, Target};
-pub use graph::Limits;
+pub use explain::{Effect, Reach, Reached, Term};
+pub use graph::{Limits, Stop};
 pub use observed::{Observation, Replicate};
 pub use operations::{Given, Update};
 pub use propose::{Change, Constraint, Draws, Weight};
@@ -494,6 +496,11 @@ impl Trace {
     /// Turns incremental updates off (every proposal re-runs the whole program) or on again; chains are the same either way.
     pub fn set_incremental(&mut self, on: bool) {
         self.graph.incremental = on;
+    }
+
+    /// Sets other bounds on what updates may build.
+    pub fn set_limits(&mut self, limits: Limits) {
+        self.graph.limits = limits;
     }
 
     /// Starts to note which operations are executed.

@@ -24,7 +24,7 @@ pub use interface::{DataItem, Interface, ParamItem, inspect};
 
 use super::builtins::Table;
 use super::builtins::data::Options;
-use super::code::{Block, BlockId, BlockKind, Code, Op, Operand, Slot};
+use super::code::{Block, BlockId, BlockKind, Code, Eager, Op, Operand, Slot};
 use super::error::Fault;
 use super::load::Loaded;
 use super::value::Value;
@@ -53,6 +53,8 @@ pub struct Inputs<'a> {
     pub needs_data: bool,
     /// Values for arguments left out: of a built-in by full name, an argument by name.
     pub defaults: FxHashMap<(String, String), Value>,
+    /// What is to run although nothing asks for it.
+    pub eager: Eager,
 }
 
 /// An inference block.
@@ -101,7 +103,7 @@ pub struct Compiled {
 /// Everything that is wrong with it, in the order of the text; settings first.
 pub fn compile(loaded: &Loaded, inputs: Inputs, map: &mut SourceMap) -> Result<Compiled, Vec<Diagnostic>> {
     let mut l = Lowerer {
-        code: Code { builtins: Arc::clone(&inputs.builtins), ..Code::default() },
+        code: Code { builtins: Arc::clone(&inputs.builtins), eager: inputs.eager, ..Code::default() },
         inputs,
         loaded,
         map,

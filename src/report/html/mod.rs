@@ -7,7 +7,8 @@ mod plots;
 
 use super::{Quantity, number, r_hat_text, seconds};
 use crate::infer::draws::KernelStats;
-use encode::{base64, coordinates, escaped};
+pub use encode::base64;
+use encode::{coordinates, escaped};
 use std::fmt::Write;
 
 /// What a page shows.

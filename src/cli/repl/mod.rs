@@ -1,0 +1,205 @@
+//! `pcadlang repl`: a session at a prompt, or a script that is piped in.
+
+mod blocks;
+mod editor;
+mod iterm;
+mod kitty;
+mod pictures;
+mod sixel;
+#[cfg(test)]
+mod testing;
+
+use super::args::{Given, Graphics, Job, Repl, Sampling};
+use super::{Failure, given, has_colors, plain, term};
+use editor::{Lines, Typed, is_whole};
+use pcadlang::report::number;
+use pcadlang::session::{Reply, Session, Status, Trouble};
+use pcadlang::trace::Stop;
+use std::cell::{Cell, RefCell};
+use std::io::{BufRead, IsTerminal, Write};
+use std::rc::Rc;
+use std::sync::atomic::{AtomicBool, AtomicU32, Ordering};
+
+/// The prompt.
+const PROMPT: &str = "pcad> ";
+/// Before the lines of a recording that go on.
+const CONTINUED: &str = "    > ";
+
+/// Set by Ctrl-C.
+static STOP: AtomicBool = AtomicBool::new(false);
+/// How often Ctrl-C was pressed since the last entry.
+static PRESSED: AtomicU32 = AtomicU32::new(0);
+
+/// Runs a session until its input ends.
+pub fn repl(a: &Repl) -> Result<(), Failure> {
+    let stop = Stop::new(&STOP);
+    let (session, said) = open(a, stop)?;
+    let is_live = std::io::stdin().is_terminal() && std::io::stdout().is_terminal() && !a.transcript;
+    // If no handler can be set, the system's own stays.
+    let _ = ctrlc::set_handler(move || {
+        stop.set(true);
+        // A single operation, such as an array of a billion numbers, cannot be ended.
+        if PRESSED.fetch_add(1, Ordering::SeqCst) >= 2 {
+            std::process::exit(3);
+        }
+    });
+    let shown = Rc::new(Cell::new(false));
+    let mut front = Front { session: Rc::new(RefCell::new(session)), graphics: graphics(a), shown, stop };
+    print(&said.text);
+    if is_live { front.prompt() } else { front.script(a.transcript) }
+}
+
+fn open(a: &Repl, stop: Stop) -> Result<(Session, Reply), Failure> {
+    let Some(path) = &a.program else {
+        return Session::new(a.seed, Some(stop)).map(|s| (s, Reply::default())).map_err(Failure::from);
+    };
+    let job = job(a, path);
+    let (program, _) = given::observe(given::program(&job.given, false)?, &job)?;
+    Ok(Session::open(program, a.seed, Some(stop))?)
+}
+
+/// What the program is given, as `run` has it.
+fn job(a: &Repl, path: &str) -> Job {
+    let sampling = Sampling {
+        seed: a.seed,
+        chains: 1,
+        threads: None,
+        steps: None,
+        warmup: None,
+        time: None,
+        no_incremental: false,
+    };
+    Job {
+        given: Given { program: path.to_owned(), sets: a.sets.clone(), camera: a.camera.clone() },
+        observe: a.observe.clone(),
+        observe_contours: None,
+        keypoints: a.keypoints.clone(),
+        features_from: None,
+        sampling,
+    }
+}
+
+fn graphics(a: &Repl) -> Graphics {
+    let variable = |name: &str| std::env::var(name).ok();
+    a.graphics.unwrap_or_else(|| pictures::told_by(variable, std::io::stdout().is_terminal()))
+}
+
+impl From<Trouble> for Failure {
+    fn from(t: Trouble) -> Self {
+        match t {
+            Trouble::Program(e) => Failure::Program(e),
+            Trouble::Plain(message, hint) => Failure::Plain(message, hint),
+            Trouble::Stopped => Failure::Interrupted,
+        }
+    }
+}
+
+/// A session and how it is shown.
+struct Front {
+    session: Rc<RefCell<Session>>,
+    graphics: Graphics,
+    /// Whether there is a line of progress on the terminal.
+    shown: Rc<Cell<bool>>,
+    stop: Stop,
+}
+
+impl Front {
+    /// Reads entries from the terminal.
+    fn prompt(&mut self) -> Result<(), Failure> {
+        let wrong = |e: rustyline::error::ReadlineError| plain(format!("the terminal cannot be used: {e}"));
+        let mut lines = Lines::new(Rc::clone(&self.session), has_colors()).map_err(wrong)?;
+        let shown = Rc::clone(&self.shown);
+        self.session.borrow_mut().set_watch(move |s| {
+            eprint!("\r\x1b[K{}", progress(s));
+            shown.set(true);
+        });
+        println!("pcadlang {}: :help lists the commands, Tab completes, Ctrl-D leaves", env!("CARGO_PKG_VERSION"));
+        let mut told = None;
+        loop {
+            let done = self.session.borrow().is_background_done();
+            if done.is_some() && done != told {
+                println!("run {} is done: `:stop` takes over its state", done.unwrap_or_default());
+                told = done;
+            }
+            match lines.next(PROMPT).map_err(wrong)? {
+                Typed::Entry(text) => match self.enter(&text) {
+                    Ok(true) => return Ok(()),
+                    Ok(false) => {}
+                    Err(Failure::Interrupted) => eprintln!("{}", Trouble::Stopped),
+                    Err(failure) => {
+                        term::fail(failure);
+                    }
+                },
+                Typed::Cleared => {}
+                Typed::End => return Ok(()),
+            }
+        }
+    }
+
+    /// Reads entries as a script; a recording shows them too, and errors among what is said.
+    fn script(&mut self, transcript: bool) -> Result<(), Failure> {
+        let mut lines = std::io::stdin().lock().lines();
+        while let Some(entry) = next_entry(&mut lines, transcript)? {
+            match self.enter(&entry) {
+                Ok(true) => return Ok(()),
+                Ok(false) => {}
+                Err(Failure::Plain(message, hint)) if transcript => {
+                    print(&Trouble::Plain(message, hint).to_string());
+                    println!();
+                }
+                Err(Failure::Program(e)) if transcript => print(&e.to_string()),
+                Err(failure) => return Err(failure),
+            }
+        }
+        Ok(())
+    }
+
+    /// Does an entry and shows what came of it; true if the user leaves.
+    fn enter(&mut self, text: &str) -> Result<bool, Failure> {
+        self.stop.set(false);
+        PRESSED.store(0, Ordering::SeqCst);
+        let done = self.session.borrow_mut().enter(text);
+        if self.shown.take() {
+            eprint!("\r\x1b[K");
+        }
+        let reply = done?;
+        print(&reply.text);
+        if let Some(picture) = &reply.picture {
+            print(&pictures::shown(picture, self.graphics)?);
+        }
+        Ok(reply.ends)
+    }
+}
+
+/// The next entry of a script: a line, and those that it goes on in.
+fn next_entry(
+    lines: &mut impl Iterator<Item = std::io::Result<String>>,
+    transcript: bool,
+) -> Result<Option<String>, Failure> {
+    let mut entry: Option<String> = None;
+    for line in lines {
+        let line = line.map_err(|e| plain(format!("the input cannot be read: {e}")))?;
+        if transcript {
+            let prompt = if entry.is_none() { PROMPT } else { CONTINUED };
+            println!("{}", format!("{prompt}{line}").trim_end());
+        }
+        let text = entry.map_or_else(|| line.clone(), |e| format!("{e}\n{line}"));
+        if is_whole(&text) {
+            return Ok(Some(text));
+        }
+        entry = Some(text);
+    }
+    Ok(entry)
+}
+
+/// Prints at once, also without a line end.
+fn print(text: &str) {
+    print!("{text}");
+    let _ = std::io::stdout().flush();
+}
+
+/// The line of progress.
+fn progress(s: &Status) -> String {
+    let best = s.best.map_or(String::new(), |b| format!(", best log joint {}", number(b)));
+    format!("{} steps, {} draws{best}, {} s; Ctrl-C ends it", s.steps, s.draws, s.elapsed.as_secs())
+}

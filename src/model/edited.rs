@@ -1,0 +1,112 @@
+//! Programs made from programs: another text, more at the end, a question; and the plans of a model by name. For whoever writes a
+//! program bit by bit.
+
+use super::{Error, Files, Model, Program};
+use crate::diag::IntoDiagnostic;
+use crate::lang::load::Disk;
+use crate::syntax::ast::{Item, ItemKind, KStmt, Stmt, StmtKind};
+use crate::syntax::span::FileId;
+use crate::syntax::{SyntaxError, parse, parse_expr};
+use std::sync::Arc;
+
+impl Program {
+    /// The same program with another text: what it was given stays, and so do the files that it has read.
+    ///
+    /// # Errors
+    /// As [`Program::open`].
+    pub fn edited(&self, text: &str) -> Result<Program, Error> {
+        let new = Program::read(&self.name, text, Arc::clone(&self.loader))?;
+        let (loaded, sources, text) = (new.loaded, new.sources, new.text);
+        Ok(Program { loaded, sources, text, ..self.clone() })
+    }
+
+    /// The same program with more items at its end, from a text of its own that includes nothing.
+    ///
+    /// # Errors
+    /// If the text does not parse.
+    pub fn and(&self, name: &str, text: &str) -> Result<Program, Error> {
+        self.with_items(name, text, |text, file| match parse(text, file) {
+            (program, errors) if errors.is_empty() => Ok(program.items),
+            (_, errors) => Err(errors),
+        })
+    }
+
+    /// The same program with `sample e;` at its end, `e` being the expression of a text of its own: its value is that of the last
+    /// of [`Code::samples`].
+    ///
+    /// # Errors
+    /// If the text is no expression.
+    pub fn asking(&self, name: &str, text: &str) -> Result<Program, Error> {
+        self.with_items(name, text, |text, file| {
+            let expr = parse_expr(text, file)?;
+            let span = expr.span;
+            let stmt = Stmt { kind: StmtKind::Sample(expr), span };
+            Ok(vec![Item { kind: ItemKind::Stmt(stmt), span }])
+        })
+    }
+
+    fn with_items(
+        &self,
+        name: &str,
+        text: &str,
+        items: impl Fn(&str, FileId) -> Result<Vec<Item>, Vec<SyntaxError>>,
+    ) -> Result<Program, Error> {
+        let mut more = self.clone();
+        let file = more.sources.add(name, text);
+        match items(text, file) {
+            Ok(items) => {
+                if let Some(main) = more.loaded.units.first_mut() {
+                    main.includes.resize(main.includes.len() + items.len(), None);
+                    main.program.items.extend(items);
+                }
+                Ok(more)
+            }
+            Err(errors) => {
+                let diagnostics = errors.into_iter().map(IntoDiagnostic::into_diagnostic).collect();
+                Err(Error { diagnostics, sources: more.sources })
+            }
+        }
+    }
+
+    /// The same program as it would be loaded from a file of its text: from there it includes and reads.
+    ///
+    /// # Errors
+    /// If it would not load from there.
+    pub fn written_as(&self, path: &str) -> Result<Program, Error> {
+        Program { name: path.to_owned(), loader: Arc::new(Disk), ..self.clone() }.edited(&self.text)
+    }
+
+    /// Another program with what this one was given, as far as it asks for it.
+    ///
+    /// # Errors
+    /// As [`Program::open`].
+    pub fn replaced(&self, path: &str) -> Result<Program, Error> {
+        let new = Program::open(path)?;
+        let interface = new.interface();
+        let mut new =
+            Program { loaded: new.loaded, sources: new.sources, name: new.name, text: new.text, ..self.clone() };
+        new.sets.retain(|(name, _)| interface.params.iter().any(|p| p.name == *name));
+        new.data.retain(|name, _| interface.data.iter().any(|d| d.name == *name));
+        // Files may have changed.
+        new.files = Files::default();
+        new.loader = Arc::new(Disk);
+        Ok(new)
+    }
+}
+
+impl Model {
+    /// The names of its inference blocks that have one.
+    pub fn plan_names(&self) -> impl Iterator<Item = &str> {
+        self.compiled.plans.iter().filter_map(|p| p.name.as_deref())
+    }
+
+    /// The inference block of a name.
+    pub fn plan_named(&self, name: &str) -> Option<Arc<[KStmt]>> {
+        self.compiled.plans.iter().find(|p| p.name.as_deref() == Some(name)).map(|p| Arc::clone(&p.body))
+    }
+
+    /// The last inference block.
+    pub fn last_plan(&self) -> Option<Arc<[KStmt]>> {
+        self.compiled.plans.last().map(|p| Arc::clone(&p.body))
+    }
+}

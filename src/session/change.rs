@@ -1,0 +1,156 @@
+//! Changes of the state by hand: `:flip`, `:set`, `:draw`.
+
+use super::look::{ROWS, more};
+use super::{Reply, Session, Trouble, shown};
+use crate::infer::{At, accepts};
+use crate::report::number;
+use crate::rng::{Purpose, StreamKey};
+use crate::trace::{Draws, Given, Trace};
+
+/// What the log joint density was made of.
+#[derive(Clone, Copy)]
+struct Scores {
+    joint: f64,
+    prior: f64,
+    likelihood: f64,
+}
+
+impl Scores {
+    fn of(t: &Trace) -> Scores {
+        Scores { joint: t.log_joint(), prior: t.log_prior(), likelihood: t.log_likelihood() }
+    }
+
+    /// The change to another state, in a line.
+    fn to(self, other: Scores) -> String {
+        let by = |a: f64, b: f64| if a == b { "+0".into() } else { signed(b - a) };
+        format!(
+            "log joint {} -> {} ({}: choices {}, observed {})\n",
+            number(self.joint),
+            number(other.joint),
+            by(self.joint, other.joint),
+            by(self.prior, other.prior),
+            by(self.likelihood, other.likelihood)
+        )
+    }
+}
+
+/// A number with its sign.
+fn signed(x: f64) -> String {
+    if x < 0.0 || x.is_nan() { number(x) } else { format!("+{}", number(x)) }
+}
+
+impl Session {
+    /// `:flip sel`: a Metropolis-Hastings step with proposals from the prior, as the kernel `block` does it.
+    pub(super) fn flip(&mut self, text: &str) -> Result<Reply, Trouble> {
+        let found = self.select(text)?;
+        let targets: Vec<_> = found.iter().map(|(_, t)| *t).collect();
+        let old: Vec<_> = targets.iter().map(|t| self.trace.value(*t)).collect();
+        let before = Scores::of(&self.trace);
+        let past = self.remember(&format!(":flip {text}"));
+        let at = At::new(self.seed, 0, self.clock);
+        let weight = match self.trace.regenerate(&targets, self.values()) {
+            Ok(weight) => weight,
+            Err(e) if e.is_recoverable() => {
+                return Ok(Reply::text(format!("rejected: the program has no value there: {}\n", e.message)));
+            }
+            Err(e) => return Err(Trouble::run(&self.model, *e)),
+        };
+        let mut s = String::new();
+        for ((address, t), old) in found.iter().zip(&old).take(ROWS) {
+            let new = match self.trace.was_removed(*t) || !self.trace.is_active(*t) {
+                true => "gone".to_owned(),
+                false => shown::short(&self.trace.value(*t)),
+            };
+            s += &format!("{address}: {} -> {new}\n", shown::short(old));
+        }
+        s += &more(found.len(), "choices");
+        if weight.appeared + weight.vanished > 0 {
+            s += &format!("{} choices appear, {} vanish\n", weight.appeared, weight.vanished);
+        }
+        s += &before.to(Scores::of(&self.trace));
+        let mut rng = at.stream();
+        if accepts(weight.log_weight, &mut rng) {
+            self.trace.commit();
+            self.keep(past);
+            s += &format!("accepted (log ratio {})\n", signed(weight.log_weight));
+        } else {
+            self.trace.rollback();
+            s += &format!("rejected (log ratio {}): the state stays\n", signed(weight.log_weight));
+        }
+        Ok(Reply::text(s))
+    }
+
+    /// `:set @a value`, `:set param value`.
+    pub(super) fn set(&mut self, text: &str) -> Result<Reply, Trouble> {
+        let (name, value) = split_address(text);
+        if value.is_empty() {
+            return Err(Trouble::plain("`:set` needs an address and a value").hint(":set @x 1.5"));
+        }
+        if !name.starts_with('@') {
+            return match self.is_param(name) {
+                true => self.set_param(name, value),
+                false => {
+                    Err(Trouble::plain(format!("there is no param `{name}`")).hint("choices have addresses: @name"))
+                }
+            };
+        }
+        let value = self.value_of(value)?;
+        let address = name.parse().map_err(|e| Trouble::plain(format!("{e}")))?;
+        let before = Scores::of(&self.trace);
+        let past = self.remember(&format!(":set {text}"));
+        let given = [(address, Given::Value(value))];
+        self.trace.update(&given, self.values()).map_err(|e| Trouble::run(&self.model, *e))?;
+        let after = Scores::of(&self.trace);
+        if after.joint == f64::NEG_INFINITY && before.joint > f64::NEG_INFINITY {
+            let by: Vec<String> = self.trace.impossible().iter().take(3).map(|(a, _)| a.to_string()).collect();
+            self.trace.rollback();
+            return Err(Trouble::plain(format!("that state has probability zero, by {}", by.join(", "))));
+        }
+        self.trace.commit();
+        self.keep(past);
+        Ok(Reply::text(before.to(after)))
+    }
+
+    /// `:draw`.
+    pub(super) fn draw(&mut self) -> Result<Reply, Trouble> {
+        let past = self.remember(":draw");
+        let (mut trace, said) = self.settle(&self.model, &[], self.trace.replacements())?;
+        self.force(&self.model, &mut trace, 0)?;
+        self.trace = trace;
+        self.keep(past);
+        Ok(Reply::text(said + &self.summary()))
+    }
+
+    /// Where what is proposed here is drawn.
+    fn values(&self) -> Draws {
+        Draws { key: StreamKey::new(self.seed, 0, Purpose::VALUES), step: self.clock, lane: 0 }
+    }
+}
+
+/// An address and what follows it; keys of addresses may hold spaces.
+fn split_address(text: &str) -> (&str, &str) {
+    let mut depth = 0_i64;
+    let end = text.char_indices().find(|(_, c)| {
+        match c {
+            '[' | '{' => depth += 1,
+            ']' | '}' => depth -= 1,
+            _ => {}
+        }
+        depth <= 0 && (c.is_whitespace() || *c == '=')
+    });
+    let (name, rest) = text.split_at(end.map_or(text.len(), |(i, _)| i));
+    (name, rest.trim_start().trim_start_matches('=').trim())
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    #[test]
+    fn addresses_end_at_a_space_outside_of_keys() {
+        assert_eq!(split_address("@a 1 + 2"), ("@a", "1 + 2"));
+        assert_eq!(split_address("@t[\"a b\"]/x = [1, 2]"), ("@t[\"a b\"]/x", "[1, 2]"));
+        assert_eq!(split_address("n=3"), ("n", "3"));
+        assert_eq!(split_address("@a"), ("@a", ""));
+    }
+}

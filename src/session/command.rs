@@ -1,0 +1,127 @@
+//! The commands: what may follow a colon.
+
+use super::{Reply, Session, Trouble};
+use crate::diag::nearest;
+use crate::lang::builtins::doc;
+
+/// A command, as `:help` has it.
+#[derive(Clone, Copy, Debug)]
+pub struct Command {
+    /// Its name, without the colon.
+    pub name: &'static str,
+    /// What it takes.
+    pub takes: &'static str,
+    /// One line about it.
+    pub doc: &'static str,
+}
+
+const fn command(name: &'static str, takes: &'static str, doc: &'static str) -> Command {
+    Command { name, takes, doc }
+}
+
+/// All commands, in the order of `:help`.
+pub const COMMANDS: &[Command] = &[
+    command("trace", "[SEL]", "The choices with their values and log densities, or those of a selection"),
+    command("why", "@a", "What a choice was made from, and what depends on it"),
+    command("flip", "SEL", "Propose other values from the prior, and say what that does and whether it is accepted"),
+    command("set", "@a VALUE", "Give a choice, an observation (`@y`) or a param (`n`) another value"),
+    command("draw", "", "Draw everything anew from the prior"),
+    command("undo", "", "Go back to before the last change"),
+    command(
+        "infer",
+        "[PLAN] [N] [&]",
+        "Run the program's plan, a named one, `{ … }` or a kernel; with & in the background",
+    ),
+    command("status", "", "What runs in the background, or ran last"),
+    command("wait", "", "Wait until what runs in the background is done"),
+    command("stop", "", "End what runs in the background and take over its state"),
+    command("drop", "", "End what runs in the background and forget it"),
+    command("plot", "NAME", "Histogram and course of a quantity of the last inference"),
+    command("profile", "", "Times and acceptance of the last inference, by kernel and choice"),
+    command("render", "[NAME] [FILE]", "The picture of the scene, or of a view or solid; into a file that is named"),
+    command("list", "", "The program"),
+    command("save", "NAME", "Write the program to NAME.pcad and the trace to NAME.trace.json"),
+    command("load", "NAME", "Load a program, and its trace if there is one"),
+    command("doc", "[NAME]", "Explain a built-in or command"),
+    command("help", "", "This list"),
+    command("quit", "", "Leave (also Ctrl-D)"),
+];
+
+impl Session {
+    /// Does a command, given without its colon.
+    pub(super) fn command(&mut self, text: &str) -> Result<Reply, Trouble> {
+        let (name, rest) = text.split_once(char::is_whitespace).unwrap_or((text, ""));
+        let rest = rest.trim();
+        if let Some(c) = COMMANDS.iter().find(|c| c.name == name) {
+            if c.takes.is_empty() && !rest.is_empty() {
+                return Err(Trouble::plain(format!("`:{name}` takes nothing, got `{rest}`")));
+            }
+            if !c.takes.is_empty() && !c.takes.starts_with('[') && rest.is_empty() {
+                return Err(Trouble::plain(format!("`:{name}` needs {}", c.takes)).hint(c.doc));
+            }
+        }
+        match name {
+            "trace" => self.show_trace(rest),
+            "why" => self.why(rest),
+            "flip" => self.flip(rest),
+            "set" => self.set(rest),
+            "draw" => self.draw(),
+            "undo" => self.undo(),
+            "infer" => self.infer(rest),
+            "status" => Ok(self.status()),
+            "wait" => self.wait(),
+            "stop" => self.stop(),
+            "drop" => self.drop_background(),
+            "plot" => self.plot(rest),
+            "profile" => self.profile(),
+            "render" => self.render(rest),
+            "list" => Ok(self.list()),
+            "save" => self.save(rest),
+            "load" => self.load(rest),
+            "doc" => self.doc(rest),
+            "help" => Ok(Reply::text(help())),
+            "quit" => Ok(Reply { ends: true, ..Reply::default() }),
+            _ => {
+                let near = nearest(name, COMMANDS.iter().map(|c| c.name));
+                let hint = near.map_or("`:help` lists the commands".to_owned(), |n| format!("did you mean `:{n}`?"));
+                Err(Trouble::plain(format!("there is no command `:{name}`")).hint(hint))
+            }
+        }
+    }
+
+    /// The program with numbered lines, as messages count them.
+    fn list(&self) -> Reply {
+        let lines: Vec<&str> = self.text().lines().collect();
+        let width = lines.len().to_string().len();
+        let numbered = lines.iter().enumerate().map(|(i, l)| format!("{:width$}  {l}\n", i + 1));
+        Reply::text(numbered.collect::<String>())
+    }
+
+    fn doc(&self, name: &str) -> Result<Reply, Trouble> {
+        if name.is_empty() {
+            return Ok(Reply::text("`:doc NAME` explains a built-in such as `normal`, Tab completes names\n"));
+        }
+        if let Some(c) = name.strip_prefix(':').and_then(|n| COMMANDS.iter().find(|c| c.name == n)) {
+            return Ok(Reply::text(format!(":{} {}\n\n{}.\n", c.name, c.takes, c.doc)));
+        }
+        let table = &self.model.code().builtins;
+        if let Some(text) = doc::doc(table, name) {
+            return Ok(Reply::text(text));
+        }
+        let names: Vec<String> = table.iter().map(|b| b.full_name()).collect();
+        let trouble = Trouble::plain(format!("there is no built-in `{name}`"));
+        Err(match nearest(name, names.iter().map(String::as_str)) {
+            Some(n) => trouble.hint(format!("did you mean `{n}`?")),
+            None => trouble,
+        })
+    }
+}
+
+/// What `:help` says.
+fn help() -> String {
+    let head = |c: &Command| format!(":{} {}", c.name, c.takes).trim_end().to_owned();
+    let width = COMMANDS.iter().map(|c| head(c).chars().count()).max().unwrap_or(0);
+    let line = |c: &Command| format!("  {:width$}  {}\n", head(c), c.doc);
+    let intro = "Directives are as in a file; an expression shows its value; @a or $tag shows choices.\n";
+    intro.to_owned() + &COMMANDS.iter().map(line).collect::<String>()
+}

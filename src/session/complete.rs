@@ -1,0 +1,198 @@
+//! Completion: what a word under the cursor may become, from where it stands.
+
+use super::{COMMANDS, Session};
+use crate::lang::builtins::Kind;
+use crate::lang::code::BlockKind;
+use crate::syntax::{Class, classes};
+use std::path::Path;
+
+/// What may stand in place of a piece of the line.
+#[derive(Clone, Debug, Default, PartialEq, Eq)]
+pub struct Completion {
+    /// Where the piece begins that is replaced, in bytes.
+    pub start: usize,
+    /// What may stand there, in order.
+    pub words: Vec<String>,
+}
+
+/// The words of the language.
+const KEYWORDS: &[&str] = &[
+    "assume", "let", "observe", "predict", "factor", "force", "freeze", "forget", "sample", "param", "data", "include",
+    "fn", "kernel", "infer", "report", "export", "for", "if", "else", "and", "or", "not", "true", "false", "warmup",
+    "repeat", "mix", "every", "collect", "propose",
+];
+/// The tags that choices have by their distributions.
+const KINDS: &[&str] = &["$continuous", "$discrete", "$finite", "$gaussian"];
+/// What is read from files.
+const READERS: &[&str] = &["image", "csv", "json", "mesh", "armature", "keypoints", "mask", "depth", "contours"];
+
+impl Session {
+    /// What the word that ends at byte `at` of a line may become.
+    pub fn complete(&self, line: &str, at: usize) -> Completion {
+        let Some(before) = line.get(..at) else { return Completion::default() };
+        if let Some(command) = before.strip_prefix(':') {
+            return match command.split_once(char::is_whitespace) {
+                None => found(0, before, COMMANDS.iter().map(|c| format!(":{}", c.name))),
+                Some((name, _)) => self.complete_argument(name, before),
+            };
+        }
+        self.complete_text(before)
+    }
+
+    /// What a command takes.
+    fn complete_argument(&self, command: &str, before: &str) -> Completion {
+        let start = before.rfind(char::is_whitespace).map_or(0, |i| i + 1);
+        let word = &before[start..];
+        let globals = || self.model.code().globals.keys().map(|n| n.to_string());
+        match command {
+            "save" | "load" => found(start, word, files(word, &[".pcad"])),
+            "render" => found(start, word, globals().chain(files(word, &[".png"]))),
+            "plot" => found(start, word, self.quantity_names().into_iter()),
+            "doc" => found(start, word, self.builtins()),
+            "infer" if !before.contains(['(', '{']) => {
+                let kernels = self.model.code().builtins.iter().filter(|b| matches!(b.kind, Kind::Inference));
+                let own = self.model.code().kernels.iter().map(|k| k.name.node.to_string());
+                let plans = self.model.plan_names().map(str::to_owned).collect::<Vec<_>>();
+                found(start, word, kernels.map(|b| b.name.to_string()).chain(own).chain(plans))
+            }
+            _ => self.complete_text(before),
+        }
+    }
+
+    /// What an expression or directive may hold.
+    fn complete_text(&self, before: &str) -> Completion {
+        if let Some(start) = open_string(before) {
+            let is_program = before[..start - 1].trim_end().ends_with("include");
+            let reads = |name: &&str| before[..start - 1].trim_end().trim_end_matches('(').ends_with(*name);
+            return match is_program || READERS.iter().any(|name| reads(name)) {
+                true => {
+                    found(start, &before[start..], files(&before[start..], if is_program { &[".pcad"] } else { &[] }))
+                }
+                false => Completion::default(),
+            };
+        }
+        let part_of_address = |c: char| c.is_alphanumeric() || "@_/[]#*\".-".contains(c);
+        let start = before
+            .rfind(|c: char| !part_of_address(c))
+            .map_or(0, |i| i + before[i..].chars().next().map_or(1, char::len_utf8));
+        if before[start..].contains('@') {
+            let start = start + before[start..].rfind('@').unwrap_or(0);
+            return found(start, &before[start..], self.addresses());
+        }
+        let part_of_name = |c: char| c.is_alphanumeric() || c == '_' || c == '.' || c == '$';
+        let start = before
+            .rfind(|c: char| !part_of_name(c))
+            .map_or(0, |i| i + before[i..].chars().next().map_or(1, char::len_utf8));
+        let word = &before[start..];
+        if word.starts_with('$') {
+            let tags = self.model.code().tags.iter().map(|t| format!("${t}"));
+            return found(start, word, tags.chain(KINDS.iter().map(|k| (*k).to_owned())));
+        }
+        if word.starts_with(|c: char| c.is_ascii_digit()) {
+            return Completion::default();
+        }
+        let arguments = enclosing_call(&before[..start]).map(|name| self.arguments(&name)).unwrap_or_default();
+        let globals = self.model.code().globals.keys().map(|n| n.replace('/', "."));
+        let keywords = KEYWORDS.iter().map(|k| (*k).to_owned());
+        found(start, word, arguments.into_iter().chain(globals).chain(self.builtins()).chain(keywords))
+    }
+
+    /// The addresses of choices and observations.
+    fn addresses(&self) -> impl Iterator<Item = String> {
+        let choices = self.trace.choices().into_iter().map(|(a, _, _)| a.to_string());
+        choices.chain(self.trace.observed().into_iter().map(|o| o.address.to_string()))
+    }
+
+    /// The built-ins that are called by name.
+    fn builtins(&self) -> impl Iterator<Item = String> {
+        let all = self.model.code().builtins.iter().filter(|b| b.name.starts_with(|c: char| c.is_ascii_alphabetic()));
+        all.map(|b| b.full_name())
+    }
+
+    /// The arguments of a function, distribution or kernel, as one writes them.
+    fn arguments(&self, name: &str) -> Vec<String> {
+        let code = self.model.code();
+        let written = |n: &str| format!("{n} = ");
+        let functions = code.blocks.iter().find_map(|b| match &b.kind {
+            BlockKind::Function { name: n, params, .. } if **n == *name => Some(params),
+            _ => None,
+        });
+        if let Some(params) = functions {
+            return params.iter().map(|p| written(p)).collect();
+        }
+        if let Some(k) = code.kernels.iter().find(|k| *k.name.node == *name) {
+            return k.params.iter().map(|p| written(&p.name.node)).collect();
+        }
+        let builtin = code.builtins.iter().find(|b| b.full_name() == name);
+        builtin.map(|b| b.args.iter().map(|a| written(&a.name)).collect()).unwrap_or_default()
+    }
+}
+
+/// Those of some words that begin like this one, sorted, each once.
+fn found(start: usize, word: &str, all: impl Iterator<Item = String>) -> Completion {
+    let mut words: Vec<String> = all.filter(|w| w.starts_with(word)).collect();
+    words.sort();
+    words.dedup();
+    Completion { start, words }
+}
+
+/// Where the text of a string begins that is not closed yet.
+fn open_string(before: &str) -> Option<usize> {
+    let mut open = None;
+    let mut chars = before.char_indices();
+    while let Some((i, c)) = chars.next() {
+        match c {
+            '\\' if open.is_some() => {
+                chars.next();
+            }
+            '"' => open = if open.is_some() { None } else { Some(i + 1) },
+            _ => {}
+        }
+    }
+    open
+}
+
+/// The name of the function whose arguments a text ends in.
+fn enclosing_call(before: &str) -> Option<String> {
+    let hidden: Vec<_> = classes(before)
+        .into_iter()
+        .filter(|(_, c)| matches!(c, Class::String | Class::Comment | Class::Address))
+        .collect();
+    let mut depth = 0;
+    for (i, c) in before.char_indices().rev() {
+        if hidden.iter().any(|(r, _)| r.contains(&i)) {
+            continue;
+        }
+        match c {
+            ')' | ']' | '}' => depth += 1,
+            '(' if depth == 0 => {
+                let head = before[..i].trim_end();
+                let start = head
+                    .rfind(|c: char| !(c.is_alphanumeric() || c == '_' || c == '.'))
+                    .map_or(0, |j| j + head[j..].chars().next().map_or(1, char::len_utf8));
+                return Some(head[start..].to_owned()).filter(|n| !n.is_empty());
+            }
+            '(' | '[' | '{' => depth -= 1,
+            ';' if depth == 0 => return None,
+            _ => {}
+        }
+        if depth < 0 {
+            // Within an array or record of the call.
+            depth = 0;
+        }
+    }
+    None
+}
+
+/// Files and folders whose path begins like this one; of files those with one of the endings, if there are any.
+fn files(word: &str, endings: &[&str]) -> impl Iterator<Item = String> + use<> {
+    let folder = word.rfind('/').map_or("", |i| &word[..=i]).to_owned();
+    let endings: Vec<String> = endings.iter().map(|e| (*e).to_owned()).collect();
+    let listed = std::fs::read_dir(if folder.is_empty() { Path::new(".") } else { Path::new(&folder) });
+    listed.into_iter().flatten().flatten().filter_map(move |e| {
+        let name = e.file_name().into_string().ok().filter(|n| !n.starts_with('.'))?;
+        let is_folder = e.path().is_dir();
+        let fits = is_folder || endings.is_empty() || endings.iter().any(|x| name.ends_with(x.as_str()));
+        fits.then(|| format!("{folder}{name}{}", if is_folder { "/" } else { "" }))
+    })
+}

@@ -1,0 +1,243 @@
+//! Directives: the program grows by them, and the trace is made again with the choices that it had.
+
+use super::{INPUT, Reply, Session, Trouble, exported, exported_operand, shown};
+use crate::diag::SourceMap;
+use crate::lang::code::Operand;
+use crate::lang::load::reason;
+use crate::lang::value::Value;
+use crate::model::{Model, Program};
+use crate::report::write_file;
+use crate::syntax::ast::{ExprKind, Item, ItemKind, Stmt, StmtKind};
+use crate::syntax::{parse, print_expr};
+use crate::trace::Trace;
+use std::path::Path;
+use std::sync::Arc;
+
+/// What a text that was typed holds.
+#[derive(Default)]
+struct Entry {
+    /// What becomes part of the program.
+    kept: String,
+    /// Names to show afterwards.
+    names: Vec<Arc<str>>,
+    /// Expressions of `sample` to evaluate.
+    samples: Vec<String>,
+    /// Inference blocks to run, with their names.
+    plans: Vec<(Option<Arc<str>>, String)>,
+}
+
+impl Session {
+    /// Adds directives to the program, runs inference blocks among them, and says what came of it.
+    pub(super) fn add(&mut self, text: &str) -> Result<Reply, Trouble> {
+        let entry = read(text);
+        let past = self.remember(&first_line(text));
+        let before = self.trace.log_joint();
+        let mut said = String::new();
+        let known = (self.model.reports().len(), self.model.exports().len());
+        if !entry.kept.is_empty() {
+            let grown = grown(self.text(), &entry.kept);
+            said += &self.rewrite(self.program.edited(&grown)?)?;
+            self.keep(past);
+        }
+        if let Err(e) = self.follow(&entry, known, &mut said) {
+            if !entry.kept.is_empty()
+                && let Some(past) = self.past.pop_back()
+            {
+                self.go_back(&past)?;
+            }
+            return Err(e);
+        }
+        let after = self.trace.log_joint();
+        if entry.plans.is_empty() && after.to_bits() != before.to_bits() {
+            said += &self.summary();
+        }
+        Ok(Reply::text(said))
+    }
+
+    /// Goes over to another version of the program, with the choices that it shares with this one; gives what is to be said.
+    pub(super) fn rewrite(&mut self, program: Program) -> Result<String, Trouble> {
+        let model = program.clone().compile()?;
+        let choices = self.trace.constraints();
+        let (mut trace, said) = self.settle(&model, &choices, self.trace.replacements())?;
+        let known = self.model.code().forces.len();
+        self.force(&model, &mut trace, known)?;
+        (self.program, self.model, self.trace) = (Arc::new(program), Arc::new(model), trace);
+        Ok(said)
+    }
+
+    /// What an entry asks for once the program has grown.
+    fn follow(&mut self, entry: &Entry, known: (usize, usize), said: &mut String) -> Result<(), Trouble> {
+        for name in &entry.names {
+            let draws = self.looks();
+            if let Some(value) = self.trace.global(name, draws) {
+                let value = value.map_err(|e| Trouble::run(&self.model, *e))?;
+                *said += &format!("{name} = {}\n", shown::short(&value));
+            }
+        }
+        for text in &entry.samples {
+            *said += &format!("{}\n", shown::whole(&self.value_of(text)?));
+        }
+        self.report(known.0, said)?;
+        self.export(known.1, said)?;
+        for (name, block) in &entry.plans {
+            *said += &match name {
+                Some(name) => self.infer(name)?.text,
+                None => self.infer_block(block)?.text,
+            };
+        }
+        Ok(())
+    }
+
+    /// The value of an expression in this state.
+    pub(super) fn value_of(&mut self, text: &str) -> Result<Value, Trouble> {
+        let model = self.program.asking(INPUT, text)?.compile()?;
+        let mut trace = self.moved_to(&model, &self.trace)?;
+        let Some(operand) = model.code().samples.last().copied() else {
+            return Err(Trouble::plain("this is no expression"));
+        };
+        let values = trace.query(&[operand], self.looks()).map_err(|e| Trouble::run(&model, *e))?;
+        Ok(values.into_iter().next().unwrap_or_default())
+    }
+
+    /// A trace of another model with the same choices and observed values.
+    pub(super) fn moved_to(&self, model: &Model, from: &Trace) -> Result<Trace, Trouble> {
+        self.settle(model, &from.constraints(), from.replacements()).map(|(t, _)| t)
+    }
+
+    /// Gives a param of the main file another default.
+    pub(super) fn set_param(&mut self, name: &str, value: &str) -> Result<Reply, Trouble> {
+        let (program, _) = parse(self.text(), SourceMap::new().add("", self.text()));
+        let declared = program.items.iter().find_map(|i| match &i.kind {
+            ItemKind::Param(d) if *d.name.node == *name => Some(d),
+            _ => None,
+        });
+        // What the command line says goes before the default.
+        let program = match declared.and_then(|d| d.default.as_ref()) {
+            Some(e) if !self.program.is_set(name) => {
+                let (before, after) =
+                    (self.text().get(..e.span.start as usize), self.text().get(e.span.end as usize..));
+                let text = format!("{}{value}{}", before.unwrap_or_default(), after.unwrap_or_default());
+                self.program.edited(&text)?
+            }
+            _ => (*self.program).clone().set(name, value),
+        };
+        let past = self.remember(&format!(":set {name} {value}"));
+        let said = self.rewrite(program)?;
+        self.keep(past);
+        Ok(Reply::text(said + &self.summary()))
+    }
+
+    /// Whether a name is a param of the program.
+    pub(super) fn is_param(&self, name: &str) -> bool {
+        self.program.interface().params.iter().any(|p| p.name == name)
+    }
+
+    /// Shows what the reports after the first so many report.
+    fn report(&mut self, known: usize, said: &mut String) -> Result<(), Trouble> {
+        let model = Arc::clone(&self.model);
+        for e in model.reports().iter().skip(known).flat_map(|r| &r.exprs) {
+            if let Some(operand) = model.code().queries.get(&e.span) {
+                *said += &format!("{} = {}\n", print_expr(e), shown::whole(&self.asked(*operand)?));
+            }
+        }
+        Ok(())
+    }
+
+    /// Writes what the exports after the first so many export.
+    fn export(&mut self, known: usize, said: &mut String) -> Result<(), Trouble> {
+        let model = Arc::clone(&self.model);
+        for x in model.exports().iter().skip(known) {
+            let Some(operand) = exported_operand(model.code(), x) else { continue };
+            let bytes = exported(&self.asked(operand)?, &x.file).map_err(Trouble::plain)?;
+            write_file(Path::new(&*x.file), &bytes)
+                .map_err(|e| Trouble::plain(format!("cannot write {}: {}", x.file, reason(&e))))?;
+            *said += &format!("{}\n", x.file);
+        }
+        Ok(())
+    }
+
+    /// The value of an operand of the top level.
+    fn asked(&mut self, operand: Operand) -> Result<Value, Trouble> {
+        let draws = self.looks();
+        let values = self.trace.query(&[operand], draws).map_err(|e| Trouble::run(&self.model, *e))?;
+        Ok(values.into_iter().next().unwrap_or_default())
+    }
+}
+
+/// Sorts what was typed. What does not parse is kept whole: the compiler says what is wrong.
+fn read(text: &str) -> Entry {
+    let text = closed(text);
+    let (program, errors) = parse(&text, SourceMap::new().add(INPUT, &text));
+    if !errors.is_empty() {
+        return Entry { kept: text, ..Entry::default() };
+    }
+    let mut entry = Entry::default();
+    for item in &program.items {
+        let slice = text.get(item.span.start as usize..item.span.end as usize).unwrap_or_default();
+        match &item.kind {
+            ItemKind::Infer { name: None, .. } => entry.plans.push((None, slice.to_owned())),
+            ItemKind::Stmt(s) if matches!(s.kind, StmtKind::Sample(_)) => {
+                let e = slice.trim_start_matches("sample").trim_end_matches(';');
+                entry.samples.push(e.trim().to_owned());
+            }
+            // What only has a value is looked at.
+            ItemKind::Stmt(Stmt { kind: StmtKind::Expr(e), .. }) if !matches!(e.kind, ExprKind::Call { .. }) => {
+                entry.samples.push(slice.trim_end_matches(';').trim().to_owned());
+            }
+            kind => {
+                if let ItemKind::Infer { name: Some(name), .. } = kind {
+                    entry.plans.push((Some(Arc::clone(&name.node)), slice.to_owned()));
+                }
+                entry.names.extend(bound(item));
+                entry.kept += slice;
+                entry.kept += "\n";
+            }
+        }
+    }
+    // Comments and the layout stay where nothing is taken out.
+    if entry.samples.is_empty() && !entry.plans.iter().any(|(name, _)| name.is_none()) && !entry.kept.is_empty() {
+        entry.kept = text;
+    }
+    entry
+}
+
+/// The text with the semicolon that one forgets at a prompt; on a line of its own where a comment ends the text.
+fn closed(text: &str) -> String {
+    let parses = |text: &str| parse(text, SourceMap::new().add(INPUT, "")).1.is_empty();
+    let ways = [text.to_owned(), format!("{text};"), format!("{text}\n;")];
+    ways.into_iter().find(|t| parses(t)).unwrap_or_else(|| text.to_owned())
+}
+
+/// The name that an item binds to a value worth showing.
+fn bound(item: &Item) -> Option<Arc<str>> {
+    match &item.kind {
+        ItemKind::Param(d) | ItemKind::Data(d) => Some(Arc::clone(&d.name.node)),
+        ItemKind::Stmt(s) => match &s.kind {
+            StmtKind::Assume { name, .. } | StmtKind::Let { name, .. } | StmtKind::Predict { name, .. } => {
+                Some(Arc::clone(&name.node))
+            }
+            StmtKind::Draw { target, .. } => match &target.kind {
+                ExprKind::Var(name) => Some(Arc::clone(name)),
+                _ => None,
+            },
+            _ => None,
+        },
+        _ => None,
+    }
+}
+
+/// A program's text with more at its end.
+fn grown(text: &str, more: &str) -> String {
+    let gap = if text.is_empty() || text.ends_with('\n') { "" } else { "\n" };
+    format!("{text}{gap}{}\n", more.trim_end())
+}
+
+/// The first line of what was typed, cut, for messages.
+fn first_line(text: &str) -> String {
+    let line = text.lines().next().unwrap_or("");
+    if line.chars().count() > 60 || text.lines().nth(1).is_some() {
+        line.chars().take(59).chain(['…']).collect()
+    } else {
+        line.to_owned()
+    }
+}

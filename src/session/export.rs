@@ -1,0 +1,30 @@
+//! What `export e to "file";` writes: a mesh of what is a solid or a view, else the value as text.
+
+use crate::geom::{glb, obj};
+use crate::lang::builtins::scene::{SolidValue, ViewValue};
+use crate::lang::code::{Code, Operand};
+use crate::lang::lower::Export;
+use crate::lang::value::Value;
+use crate::syntax::ast::ExprKind;
+
+/// What an export is of: of `best(e)` it is `e`, in the state at hand.
+pub fn exported_operand(code: &Code, x: &Export) -> Option<Operand> {
+    let inner = match &x.expr.kind {
+        ExprKind::Call { args, .. } if args.len() == 1 => &args[0].value,
+        _ => &x.expr,
+    };
+    code.queries.get(&inner.span).or_else(|| code.queries.get(&x.expr.span)).copied()
+}
+
+/// The bytes of a file of this name with a value in it.
+///
+/// # Errors
+/// A solid that has no mesh: too far away or too small for single precision.
+pub fn exported(value: &Value, file: &str) -> Result<Vec<u8>, String> {
+    let solid = value.downcast::<ViewValue>().map(|v| v.0.solid().clone());
+    let Some(solid) = solid.or_else(|| value.downcast::<SolidValue>().map(|s| s.0.clone())) else {
+        return Ok(value.to_string().into_bytes());
+    };
+    let mesh = solid.to_mesh().map_err(|e| e.to_string())?;
+    Ok(if file.ends_with(".glb") { glb::write(&mesh) } else { obj::write(&mesh).into_bytes() })
+}

@@ -1,0 +1,65 @@
+//! `:save` and `:load`: the program as a `.pcad` file, the trace beside it.
+
+use super::{Reply, Session, Trouble};
+use crate::lang::load::reason;
+use crate::report::write_file;
+use crate::trace::{SavedTrace, Trace};
+use std::path::Path;
+use std::sync::Arc;
+
+impl Session {
+    /// `:save NAME`.
+    pub(super) fn save(&mut self, name: &str) -> Result<Reply, Trouble> {
+        let name = bare(name);
+        let (program, trace) = (format!("{name}.pcad"), format!("{name}.trace.json"));
+        let written = self.program.written_as(&program).map_err(|e| {
+            let first = e.diagnostics.first().map_or_else(String::new, |d| d.message.clone());
+            Trouble::plain(format!("{program} would not load: {first}"))
+                .hint("what it includes is looked for from its own folder: save it there")
+        })?;
+        let saved = self.trace.save(&written.hash());
+        let bytes = serde_json::to_vec(&saved).map_err(|e| Trouble::plain(e.to_string()))?;
+        // The trace first: a program without its trace is whole, a trace beside an older program would be refused.
+        for (path, bytes) in [(&trace, &bytes[..]), (&program, self.text().as_bytes())] {
+            write_file(Path::new(path), bytes)
+                .map_err(|e| Trouble::plain(format!("cannot write {path}: {}", reason(&e))))?;
+        }
+        Ok(Reply::text(format!("{program}, {trace}\n")))
+    }
+
+    /// `:load NAME`.
+    pub(super) fn load(&mut self, name: &str) -> Result<Reply, Trouble> {
+        let path = format!("{}.trace.json", bare(name));
+        let program = self.program.replaced(&format!("{}.pcad", bare(name)))?;
+        let (loaded, note) = Session::open(program, self.seed, self.limits.stop)?;
+        let past = self.remember(&format!(":load {name}"));
+        let (mut said, mut trace) = (note.text, loaded.trace);
+        if let Some(saved) = saved_trace(Path::new(&path))? {
+            let code = Arc::clone(loaded.model.code());
+            trace = Trace::load(code, loaded.model.hash(), &saved, self.limits).map_err(|e| {
+                Trouble::plain(format!("{path}: {e}")).hint("without that file the program loads alone")
+            })?;
+            said += &format!("with the trace of {path}\n");
+        }
+        (self.program, self.model, self.trace) = (loaded.program, loaded.model, trace);
+        self.keep(past);
+        Ok(Reply::text(said + &self.summary()))
+    }
+}
+
+/// The saved trace in a file, if there is one.
+fn saved_trace(path: &Path) -> Result<Option<SavedTrace>, Trouble> {
+    let wrong = |e: String| Trouble::plain(format!("{}: {e}", path.display()));
+    let bytes = match std::fs::read(path) {
+        Ok(bytes) => bytes,
+        Err(e) if e.kind() == std::io::ErrorKind::NotFound => return Ok(None),
+        Err(e) => return Err(wrong(reason(&e))),
+    };
+    serde_json::from_slice(&bytes).map(Some).map_err(|e| wrong(format!("not a saved trace: {e}")))
+}
+
+/// A name without the endings that are added to it.
+fn bare(name: &str) -> &str {
+    let name = name.trim_matches('"');
+    name.strip_suffix(".pcad").or_else(|| name.strip_suffix(".trace.json")).unwrap_or(name)
+}

@@ -1,0 +1,92 @@
+//! What is kept of the draws of a run: some of them, and counts over all.
+
+use crate::infer::draws::{Column, DrawRow, Sink};
+use crate::report::{ChainDraws, Memory};
+use std::io;
+use std::sync::{Arc, Mutex, PoisonError};
+
+/// Numbers kept at most.
+const NUMBERS: usize = 4_000_000;
+
+/// The draws so far. Clones share them: one goes to the chain, the other is looked into.
+#[derive(Clone, Debug)]
+pub(super) struct Kept {
+    memory: Memory,
+    seen: Arc<Mutex<Seen>>,
+}
+
+/// What is known of all draws so far.
+#[derive(Clone, Copy, Debug, Default, PartialEq)]
+pub(super) struct Seen {
+    pub draws: u64,
+    /// Draws that are another state than the one before, as far as the log joint density tells.
+    pub moved: u64,
+    pub best: Option<f64>,
+    last: Option<f64>,
+}
+
+impl Default for Kept {
+    fn default() -> Self {
+        Kept { memory: Memory::bounded(NUMBERS), seen: Arc::default() }
+    }
+}
+
+impl Kept {
+    /// What is known of all draws so far.
+    pub fn seen(&self) -> Seen {
+        *self.seen.lock().unwrap_or_else(PoisonError::into_inner)
+    }
+
+    /// The draws that are kept.
+    pub fn draws(&self) -> ChainDraws {
+        self.memory.draws()
+    }
+}
+
+impl Sink for Kept {
+    fn columns(&mut self, columns: &[Column]) -> io::Result<()> {
+        self.memory.columns(columns)
+    }
+
+    fn draw(&mut self, row: &DrawRow) -> io::Result<()> {
+        let mut seen = self.seen.lock().unwrap_or_else(PoisonError::into_inner);
+        seen.draws += 1;
+        seen.moved += u64::from(seen.last.is_none_or(|l| l.to_bits() != row.log_joint.to_bits()));
+        seen.last = Some(row.log_joint);
+        seen.best = Some(seen.best.map_or(row.log_joint, |b| b.max(row.log_joint)));
+        drop(seen);
+        self.memory.draw(row)
+    }
+
+    fn chain_done(&mut self, chain: u32, steps: u64, warmup: u64, seconds: f64) -> io::Result<()> {
+        self.memory.chain_done(chain, steps, warmup, seconds)
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    #[test]
+    fn all_draws_count_and_clones_see_them() {
+        let kept = Kept::default();
+        let mut sink = kept.clone();
+        sink.columns(&[Column::scalar("x")]).unwrap();
+        for (draw, log_joint) in [-3.0, -1.0, -1.0, -2.0].into_iter().enumerate() {
+            let draw = draw as u64;
+            let row = DrawRow {
+                chain: 1,
+                draw,
+                step: draw,
+                log_joint,
+                log_prior: 0.0,
+                log_likelihood: 0.0,
+                values: vec![0.5],
+            };
+            sink.draw(&row).unwrap();
+        }
+        let seen = kept.seen();
+        assert_eq!((seen.draws, seen.moved, seen.best), (4, 3, Some(-1.0)));
+        assert_eq!(kept.draws().rows.len(), 4);
+    }
+}

@@ -1,0 +1,91 @@
+//! `:trace`: the choices of the state.
+
+use super::{INPUT, Reply, Session, Trouble, shown};
+use crate::diag::{SourceMap, nearest};
+use crate::infer::selected;
+use crate::model::Error;
+use crate::report::number;
+use crate::report::table::aligned;
+use crate::syntax::parse_expr;
+use crate::trace::{Address, Selector, Target, Trace};
+
+/// Rows of a table at most.
+pub(super) const ROWS: usize = 40;
+
+impl Session {
+    /// `:trace [sel]`.
+    pub(super) fn show_trace(&mut self, selection: &str) -> Result<Reply, Trouble> {
+        let all = selection.is_empty();
+        let targets = if all { self.by_address(&Selector::All) } else { self.select(selection)? };
+        let t = &self.trace;
+        let mut rows = vec![["choice", "value", "drawn from", "log density"].map(str::to_owned).to_vec()];
+        for (address, target) in targets.iter().take(ROWS) {
+            let dist = t.dist(*target).map_or_else(String::new, |d| d.name().to_owned());
+            let score = number(t.score_of(*target));
+            rows.push(vec![address.to_string(), shown::short(&t.value(*target)), dist, score]);
+        }
+        let mut text = if targets.is_empty() { "no choices\n".to_owned() } else { aligned(&rows) };
+        text += &more(targets.len(), "choices");
+        if all {
+            let observed = t.observations();
+            if !observed.is_empty() {
+                let mut rows = vec![["observed", "log density"].map(str::to_owned).to_vec()];
+                rows.extend(observed.iter().take(ROWS).map(|(a, s)| vec![a.to_string(), number(*s)]));
+                text += &format!("\n{}{}", aligned(&rows), more(observed.len(), "observations"));
+            }
+            let parts = [t.log_joint(), t.log_prior(), t.log_likelihood()].map(number);
+            text += &format!("\nlog joint {} = {} (choices) + {} (observed)\n", parts[0], parts[1], parts[2]);
+        }
+        Ok(Reply::text(text))
+    }
+
+    /// The choices of a selection as it was typed, by address: at least one.
+    pub(super) fn select(&mut self, text: &str) -> Result<Vec<(Address, Target)>, Trouble> {
+        let mut sources = SourceMap::new();
+        let file = sources.add(INPUT, text);
+        let wrong = |diagnostics, sources| Trouble::from(Error { diagnostics, sources });
+        let expr = match parse_expr(text, file) {
+            Ok(e) => e,
+            Err(errors) => {
+                let all = errors.into_iter().map(crate::diag::IntoDiagnostic::into_diagnostic).collect();
+                return Err(wrong(all, sources));
+            }
+        };
+        let draws = self.looks();
+        let selector = selected(&expr, &mut self.trace, draws)
+            .map_err(|e| wrong(vec![crate::diag::IntoDiagnostic::into_diagnostic(*e)], sources))?;
+        let found = self.by_address(&selector);
+        if !found.is_empty() {
+            return Ok(found);
+        }
+        let known: Vec<String> = self.trace.all_targets().iter().map(|t| self.trace.address(*t).to_string()).collect();
+        let trouble = Trouble::plain(format!("`{text}` selects no choice of the trace"));
+        Err(match nearest(text, known.iter().map(String::as_str)) {
+            Some(n) => trouble.hint(format!("did you mean `{n}`?")),
+            None if known.is_empty() => trouble.hint("the trace has no choices yet: assume x ~ normal(0, 1)"),
+            None => trouble.hint("`:trace` shows all of them"),
+        })
+    }
+
+    /// The choices of a selection by address.
+    fn by_address(&mut self, selector: &Selector) -> Vec<(Address, Target)> {
+        let selection = self.trace.select(selector);
+        let t = &self.trace;
+        let mut all: Vec<(Address, Target)> = t.targets(selection).iter().map(|x| (t.address(*x), *x)).collect();
+        all.sort_by(|a, b| a.0.cmp(&b.0));
+        all
+    }
+}
+
+/// What is left out of a table of so many rows.
+pub(super) fn more(rows: usize, what: &str) -> String {
+    if rows > ROWS { format!("… and {} more {what}\n", rows - ROWS) } else { String::new() }
+}
+
+/// What is to be said of a state of probability zero.
+pub(super) fn impossible(t: &Trace) -> String {
+    let found = t.impossible();
+    let names: Vec<String> = found.iter().take(5).map(|(a, _)| a.to_string()).collect();
+    let more = if found.len() > 5 { format!(" and {} more", found.len() - 5) } else { String::new() };
+    format!("note: this state has probability zero, by {}{more}; `:draw` draws another one\n", names.join(", "))
+}

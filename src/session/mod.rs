@@ -1,0 +1,269 @@
+//! A session at a prompt: a program that grows line by line, one trace of it to look at and change, and inference on that, in the
+//! background too.
+//!
+//! It knows no terminal and prints nothing: [`Session::enter`] takes what was typed and gives a [`Reply`], which a front end
+//! shows; `complete` and [`crate::syntax::classes`] help it edit lines. Invariants: after an error program and trace are as they were;
+//! the same lines with the same seed give the same replies, but for times.
+
+mod change;
+mod command;
+mod complete;
+mod edit;
+mod export;
+mod files;
+mod kept;
+mod look;
+mod picture;
+mod plot;
+mod reply;
+mod run;
+mod shown;
+mod why;
+
+pub use command::{COMMANDS, Command};
+pub use complete::Completion;
+pub use export::{exported, exported_operand};
+pub use picture::{Picture, drawn, over, strokes};
+pub use reply::{Reply, Trouble};
+pub use run::Status;
+
+use crate::lang::code::{Eager, Observed};
+use crate::model::{Error, Model, Program};
+use crate::rng::{Purpose, StreamKey};
+use crate::trace::{Constraint, Draws, Limits, Stop, Trace};
+use run::{Background, Finished};
+use std::collections::VecDeque;
+use std::sync::Arc;
+
+/// What a typed text is called in messages.
+const INPUT: &str = "<input>";
+/// What a program without a file is called in messages.
+const NAME: &str = "<session>";
+/// How often choices are drawn anew where they lead to no value, or to one of probability zero.
+const ATTEMPTS: u64 = 20;
+/// Nodes that the trace may have: a slip of the pen should not take the machine's memory.
+const NODES: u32 = 20_000_000;
+/// Choices that may be remembered for `:undo`, over all that can be undone.
+const REMEMBERED: usize = 4_000_000;
+
+/// A session.
+pub struct Session {
+    seed: u64,
+    limits: Limits,
+    program: Arc<Program>,
+    model: Arc<Model>,
+    trace: Trace,
+    past: VecDeque<Past>,
+    /// Counts what was entered: random streams are keyed by it.
+    clock: u64,
+    /// Chains of inference so far.
+    chains: u32,
+    background: Option<Background>,
+    last: Option<Finished>,
+    watch: Option<Box<dyn FnMut(&Status)>>,
+}
+
+/// What `:undo` goes back to. Choices are enough to make a trace again, to the last bit.
+struct Past {
+    program: Arc<Program>,
+    model: Arc<Model>,
+    choices: Vec<(u64, Constraint)>,
+    observed: Arc<Observed>,
+    /// What was done then.
+    what: String,
+}
+
+impl Session {
+    /// A session of an empty program.
+    ///
+    /// # Errors
+    /// None that is known.
+    pub fn new(seed: u64, stop: Option<Stop>) -> Result<Session, Trouble> {
+        Session::open(Program::named(NAME, "")?, seed, stop).map(|(s, _)| s)
+    }
+
+    /// A session of a program with what it was given, and what is to be said of that. `stop` ends evaluations from outside;
+    /// whoever sets it takes it back before the next [`Session::enter`].
+    ///
+    /// # Errors
+    /// What is wrong with the program. Where only data are missing the session is one of its prior.
+    pub fn open(program: Program, seed: u64, stop: Option<Stop>) -> Result<(Session, Reply), Trouble> {
+        let limits = Limits { nodes: NODES, stop, ..Limits::default() };
+        let missing = program.missing_data();
+        let (program, note) = match &missing[..] {
+            [] => (program.eager(Eager::Names), None),
+            names => {
+                let names = names.join("`, `");
+                let note = format!("note: `{names}` is not given, so nothing is observed: this is the prior\n");
+                (program.without_data().eager(Eager::NamesOnly), Some(note))
+            }
+        };
+        let program = Arc::new(program);
+        let model = Arc::new((*program).clone().compile()?);
+        let trace = Trace::prior(Arc::clone(model.code()), limits);
+        let mut session = Session {
+            seed,
+            limits,
+            program,
+            model,
+            trace,
+            past: VecDeque::new(),
+            clock: 0,
+            chains: 0,
+            background: None,
+            last: None,
+            watch: None,
+        };
+        let model = Arc::clone(&session.model);
+        let (mut trace, said) = session.settle(&model, &[], &Arc::default())?;
+        session.force(&model, &mut trace, 0)?;
+        session.trace = trace;
+        Ok((session, Reply::text(note.unwrap_or_default() + &said)))
+    }
+
+    /// Who is shown how inference comes along while it is waited for, some times a second.
+    pub fn set_watch(&mut self, watch: impl FnMut(&Status) + 'static) {
+        self.watch = Some(Box::new(watch));
+    }
+
+    /// The text of the program.
+    pub fn text(&self) -> &str {
+        self.program.text()
+    }
+
+    /// The trace.
+    pub fn trace(&self) -> &Trace {
+        &self.trace
+    }
+
+    /// Does what was typed: directives, an expression, or a command such as `:trace`.
+    ///
+    /// # Errors
+    /// What is wrong with it; everything is then as it was.
+    pub fn enter(&mut self, text: &str) -> Result<Reply, Trouble> {
+        self.clock += 1;
+        let text = text.trim();
+        let done = match text.strip_prefix(':') {
+            Some(command) => self.command(command),
+            None if text.is_empty() => Ok(Reply::default()),
+            None if text.starts_with(['@', '$']) => self.show_trace(text),
+            None if crate::syntax::is_directive(text) => self.add(text),
+            None => self.value_of(text).map(|v| Reply::text(shown::whole(&v) + "\n")),
+        };
+        match done {
+            Err(_) if self.limits.stop.is_some_and(Stop::is_set) => Err(Trouble::Stopped),
+            done => done,
+        }
+    }
+
+    /// Where what is only looked at is drawn.
+    fn looks(&self) -> Draws {
+        Draws { key: StreamKey::new(self.seed, u32::MAX, Purpose::PREDICT), step: self.clock, lane: 0 }
+    }
+
+    /// A trace of a model with choices and observed values taken over where it has them, and what is to be said of that. Other
+    /// choices are drawn; again, a few times, where they lead nowhere.
+    fn settle(
+        &self,
+        model: &Model,
+        kept: &[(u64, Constraint)],
+        observed: &Arc<Observed>,
+    ) -> Result<(Trace, String), Trouble> {
+        let code = match observed.is_empty() {
+            true => Arc::clone(model.code()),
+            false => Arc::new(model.code().with_observed(Arc::clone(observed))),
+        };
+        let key = StreamKey::new(self.seed, 0, Purpose::START);
+        let (mut impossible, mut failure) = (None, None);
+        for (kept, note) in
+            [(kept, ""), (&[][..], "note: the choices so far lead to no value, so all were drawn anew\n")]
+        {
+            for lane in 0..ATTEMPTS {
+                let draws = Draws { key, step: self.clock, lane };
+                match Trace::generate(Arc::clone(&code), kept.iter().cloned(), draws, self.limits) {
+                    Ok((t, _)) if t.log_joint() > f64::NEG_INFINITY => return Ok((t, note.to_owned())),
+                    Ok((t, _)) => {
+                        let nothing_new = t.choice_count() <= kept.len();
+                        impossible.get_or_insert(t);
+                        if nothing_new {
+                            break;
+                        }
+                    }
+                    Err(e) if e.is_recoverable() => failure = Some(e),
+                    Err(e) => return Err(Trouble::run(model, *e)),
+                }
+            }
+            if let Some(t) = impossible {
+                let note = note.to_owned() + &look::impossible(&t);
+                return Ok((t, note));
+            }
+            if kept.is_empty() {
+                break;
+            }
+        }
+        match failure {
+            Some(e) => Err(Trouble::run(model, *e)),
+            None => Err(Trouble::plain("the program has no value")),
+        }
+    }
+
+    /// Applies the `force` statements of a model after the first so many.
+    fn force(&self, model: &Model, trace: &mut Trace, known: usize) -> Result<(), Trouble> {
+        let forces = model.code().forces.get(known..).unwrap_or_default();
+        let draws = Draws { key: StreamKey::new(self.seed, 0, Purpose::START), step: self.clock, lane: ATTEMPTS };
+        crate::infer::force(forces, trace, draws).map_err(|e| Trouble::run(model, *e))
+    }
+
+    /// What this state is, to come back to.
+    fn remember(&self, what: &str) -> Past {
+        Past {
+            program: Arc::clone(&self.program),
+            model: Arc::clone(&self.model),
+            choices: self.trace.constraints(),
+            observed: Arc::clone(self.trace.replacements()),
+            what: what.to_owned(),
+        }
+    }
+
+    /// Keeps a past, and forgets the oldest where they are too many.
+    fn keep(&mut self, past: Past) {
+        self.past.push_back(past);
+        let size = |p: &Past| p.choices.len() + 100;
+        let mut all: usize = self.past.iter().map(size).sum();
+        while all > REMEMBERED && self.past.len() > 1 {
+            all -= self.past.pop_front().as_ref().map_or(0, size);
+        }
+    }
+
+    /// Goes back to a past.
+    fn go_back(&mut self, past: &Past) -> Result<(), Trouble> {
+        let (trace, _) = self.settle(&past.model, &past.choices, &past.observed)?;
+        (self.program, self.model) = (Arc::clone(&past.program), Arc::clone(&past.model));
+        self.trace = trace;
+        Ok(())
+    }
+
+    /// `:undo`.
+    fn undo(&mut self) -> Result<Reply, Trouble> {
+        let Some(past) = self.past.pop_back() else { return Err(Trouble::plain("there is nothing to undo")) };
+        if let Err(e) = self.go_back(&past) {
+            self.past.push_back(past);
+            return Err(e);
+        }
+        Ok(Reply::text(format!("undone: {}\n{}", past.what, self.summary())))
+    }
+
+    /// The log joint density in a line.
+    fn summary(&self) -> String {
+        format!("log joint {}\n", crate::report::number(self.trace.log_joint()))
+    }
+}
+
+impl From<Error> for Trouble {
+    fn from(e: Error) -> Self {
+        Trouble::Program(Box::new(e))
+    }
+}
+
+#[cfg(test)]
+mod tests;

@@ -1,0 +1,355 @@
+//! Inference from the state at hand: in the foreground, where it is waited for, or in the background on a clone of the trace.
+//!
+//! Each run is a chain of its own number, so that no stream of random numbers is used twice. What a run finds becomes the
+//! session's state when it is waited for or stopped, and can be undone.
+
+use super::kept::{Kept, Seen};
+use super::{INPUT, Reply, Session, Trouble};
+use crate::bank::BankFiles;
+use crate::infer::draws::{KernelStats, SiteStats};
+use crate::infer::{ChainError, ChainResult, Progress, RunOptions, run_from};
+use crate::model::{Model, Program};
+use crate::platform::clock::Instant;
+use crate::report::{ChainDraws, number, seconds, table};
+use crate::syntax::ast::KStmt;
+use crate::trace::{Limits, Stop};
+use std::path::Path;
+use std::sync::Arc;
+use std::sync::atomic::{AtomicBool, Ordering};
+use std::sync::mpsc::{Receiver, RecvTimeoutError, channel};
+use std::thread::JoinHandle;
+use std::time::Duration;
+
+/// Between two looks at a run that is waited for.
+const PAUSE: Duration = Duration::from_millis(100);
+/// How often a kernel that is named by itself is applied.
+const TIMES: u64 = 1000;
+
+/// A chain under way.
+pub(super) struct Background {
+    /// What was asked for.
+    what: String,
+    number: u32,
+    /// The session's model when it began: what it finds belongs to that.
+    base: Arc<Model>,
+    /// The model it runs; another one where the plan was typed.
+    model: Arc<Model>,
+    progress: Arc<Progress>,
+    kept: Kept,
+    began: Instant,
+    /// Told when it is over, and whether it is.
+    done: Receiver<()>,
+    is_done: Arc<AtomicBool>,
+    thread: JoinHandle<Result<ChainResult, ChainError>>,
+}
+
+/// What is remembered of the last run.
+pub(super) struct Finished {
+    what: String,
+    steps: u64,
+    warmup: u64,
+    seen: Seen,
+    kernels: Vec<KernelStats>,
+    sites: Vec<SiteStats>,
+    seconds: f64,
+    pub draws: ChainDraws,
+}
+
+/// How far inference is.
+#[derive(Clone, Debug)]
+pub struct Status {
+    /// Kernel applications so far.
+    pub steps: u64,
+    /// Draws so far.
+    pub draws: u64,
+    /// The best log joint density of them.
+    pub best: Option<f64>,
+    /// Time so far.
+    pub elapsed: Duration,
+    /// Whether it has ended.
+    pub is_done: bool,
+}
+
+/// What is to be run.
+struct Job {
+    what: String,
+    model: Arc<Model>,
+    plan: Arc<[KStmt]>,
+    steps: Option<u64>,
+    /// What to say before it begins.
+    note: String,
+}
+
+impl Session {
+    /// `:infer [plan] [N] [&]`.
+    pub(super) fn infer(&mut self, text: &str) -> Result<Reply, Trouble> {
+        let (text, in_background) = match text.strip_suffix('&') {
+            Some(rest) => (rest.trim(), true),
+            None => (text, false),
+        };
+        let (plan, steps) = match text.rsplit_once(char::is_whitespace).unwrap_or(("", text)) {
+            (plan, count) if count.bytes().all(|b| b.is_ascii_digit()) && !count.is_empty() => {
+                let n = count.parse().map_err(|_| Trouble::plain(format!("{count} steps are too many")))?;
+                (plan.trim(), Some(n))
+            }
+            _ => (text, None),
+        };
+        let job = self.job(plan, steps)?;
+        self.launch(job, in_background)
+    }
+
+    /// Runs an inference block that was typed.
+    pub(super) fn infer_block(&mut self, block: &str) -> Result<Reply, Trouble> {
+        let job = self.typed(block, "infer { … }".to_owned(), None)?;
+        self.launch(job, false)
+    }
+
+    fn job(&self, plan: &str, steps: Option<u64>) -> Result<Job, Trouble> {
+        let model = Arc::clone(&self.model);
+        if plan.is_empty() {
+            let (plan, default) = model.plan()?;
+            let note = default.map_or(String::new(), |text| format!("the default plan:\n{text}"));
+            let what = if note.is_empty() { "the program's plan" } else { "the default plan" };
+            return Ok(Job { what: what.to_owned(), model, plan, steps, note });
+        }
+        if let Some(body) = model.plan_named(plan) {
+            return Ok(Job { what: plan.to_owned(), model, plan: body, steps, note: String::new() });
+        }
+        if plan.starts_with('{') {
+            return self.typed(&format!("infer {plan}"), "infer { … }".to_owned(), steps);
+        }
+        let block = format!("infer {{\n{plan};\n}}");
+        let mut job = self.typed(&block, plan.to_owned(), None)?;
+        let times = format!("infer {{ repeat {} {{\n{plan};\n}} }}", steps.unwrap_or(TIMES));
+        (job.plan, job.model) = self.compiled(&times)?;
+        Ok(job)
+    }
+
+    /// A block that is not part of the program.
+    fn typed(&self, block: &str, what: String, steps: Option<u64>) -> Result<Job, Trouble> {
+        let (plan, model) = self.compiled(block)?;
+        Ok(Job { what, model, plan, steps, note: String::new() })
+    }
+
+    fn compiled(&self, block: &str) -> Result<(Arc<[KStmt]>, Arc<Model>), Trouble> {
+        let program: Program = self.program.and(INPUT, block)?;
+        let model = program.compile()?;
+        let plan = model.last_plan().ok_or_else(|| Trouble::plain("this is no inference block"))?;
+        Ok((plan, Arc::new(model)))
+    }
+
+    fn launch(&mut self, job: Job, in_background: bool) -> Result<Reply, Trouble> {
+        if let Some(b) = &self.background {
+            let trouble = Trouble::plain(format!("run {} is in the background", b.number));
+            return Err(trouble.hint("`:wait` for it, `:stop` it, or `:drop` it first"));
+        }
+        let note = job.note.clone();
+        let stop = if in_background { None } else { self.limits.stop };
+        let run = self.begin(job, stop)?;
+        if in_background {
+            let text = format!("{note}run {} in the background: {}\n", run.number, run.what);
+            self.background = Some(run);
+            return Ok(Reply::text(text));
+        }
+        self.wait_for(&run, stop, true)?;
+        let said = self.adopt(run)?;
+        Ok(Reply::text(note + &said))
+    }
+
+    /// Starts a chain on a clone of the trace.
+    fn begin(&mut self, job: Job, stop: Option<Stop>) -> Result<Background, Trouble> {
+        let mut trace = match Arc::ptr_eq(&job.model, &self.model) {
+            true => self.trace.clone(),
+            false => self.moved_to(&job.model, &self.trace)?,
+        };
+        trace.set_limits(Limits { stop, ..self.limits });
+        self.chains += 1;
+        let number = self.chains;
+        let folder = Path::new(self.program.name()).parent().unwrap_or(Path::new("")).to_owned();
+        let banks = BankFiles::new(&job.model, &folder, None);
+        let limits = Limits { stop, ..self.limits };
+        let options = RunOptions {
+            seed: self.seed,
+            steps: job.steps,
+            banks: Some(Arc::new(banks)),
+            sites: true,
+            limits,
+            ..RunOptions::default()
+        };
+        let (progress, kept) = (Arc::new(Progress::default()), Kept::default());
+        let (over, done) = channel();
+        let is_done = Arc::new(AtomicBool::new(false));
+        let thread = {
+            let (code, plan) = (Arc::clone(job.model.code()), job.plan);
+            let (progress, mut sink, ended) = (Arc::clone(&progress), kept.clone(), Arc::clone(&is_done));
+            std::thread::Builder::new().name(format!("run {number}")).spawn(move || {
+                let result = run_from(&code, &plan, &options, &progress, &mut sink, number, trace);
+                ended.store(true, Ordering::SeqCst);
+                // Nobody listens if the run was dropped.
+                let _ = over.send(());
+                result
+            })
+        };
+        let thread = thread.map_err(|e| Trouble::plain(format!("no thread can be started: {e}")))?;
+        let base = Arc::clone(&self.model);
+        let (what, model, began) = (job.what, job.model, Instant::now());
+        Ok(Background { what, number, base, model, progress, kept, began, done, is_done, thread })
+    }
+
+    /// Waits until a run is over, or until that is stopped from outside; `ends` says whether the run ends then.
+    fn wait_for(&mut self, run: &Background, stop: Option<Stop>, ends: bool) -> Result<(), Trouble> {
+        let is_stopped = || stop.is_some_and(Stop::is_set);
+        while run.done.recv_timeout(PAUSE) == Err(RecvTimeoutError::Timeout) {
+            if is_stopped() {
+                if !ends {
+                    return Err(Trouble::Stopped);
+                }
+                run.progress.cancelled.store(true, Ordering::Relaxed);
+            }
+            if let Some(watch) = &mut self.watch {
+                watch(&run.status());
+            }
+        }
+        if ends && is_stopped() { Err(Trouble::Stopped) } else { Ok(()) }
+    }
+
+    /// Makes the last state of a run that is over the session's.
+    fn adopt(&mut self, run: Background) -> Result<String, Trouble> {
+        let joined = run.thread.join().map_err(|_| Trouble::plain("the run ended unexpectedly"))?;
+        let result = joined.map_err(|e| run.model.chain_error(e))?;
+        let finished = Finished {
+            what: run.what,
+            steps: result.steps,
+            warmup: result.warmup,
+            seen: run.kept.seen(),
+            kernels: result.kernels,
+            sites: result.sites,
+            seconds: result.seconds,
+            draws: run.kept.draws(),
+        };
+        if !Arc::ptr_eq(&run.base, &self.model) {
+            self.last = Some(finished);
+            let trouble = Trouble::plain(format!("run {} is of the program as it was before it changed", run.number));
+            return Err(trouble.hint("its state is not taken over; `:plot` and `:profile` show what it did"));
+        }
+        let mut last = result.last;
+        if !Arc::ptr_eq(&run.model, &self.model) {
+            last = self.moved_to(&self.model, &last)?;
+        }
+        last.set_limits(self.limits);
+        let past = self.remember(&format!("inference by {}", finished.what));
+        let before = std::mem::replace(&mut self.trace, last).log_joint();
+        self.keep(past);
+        let said = format!("{}log joint {} -> {}\n", finished.line(), number(before), number(self.trace.log_joint()));
+        self.last = Some(finished);
+        Ok(said)
+    }
+
+    /// `:status`.
+    pub(super) fn status(&self) -> Reply {
+        Reply::text(match (&self.background, &self.last) {
+            (Some(run), _) => run.line(),
+            (None, Some(last)) => format!("nothing runs in the background; last was {}", last.line()),
+            (None, None) => "nothing runs in the background, and nothing has run\n".to_owned(),
+        })
+    }
+
+    /// `:wait`.
+    pub(super) fn wait(&mut self) -> Result<Reply, Trouble> {
+        let run = self.taken()?;
+        let waited = self.wait_for(&run, self.limits.stop, false);
+        let said = run.line();
+        self.background = Some(run);
+        waited.map(|()| Reply::text(said))
+    }
+
+    /// `:stop`.
+    pub(super) fn stop(&mut self) -> Result<Reply, Trouble> {
+        let run = self.taken()?;
+        run.progress.cancelled.store(true, Ordering::Relaxed);
+        if let Err(e) = self.wait_for(&run, self.limits.stop, false) {
+            self.background = Some(run);
+            return Err(e);
+        }
+        let number = run.number;
+        self.adopt(run).map(|said| Reply::text(format!("run {number} is the state now\n{said}")))
+    }
+
+    /// `:drop`.
+    pub(super) fn drop_background(&mut self) -> Result<Reply, Trouble> {
+        let run = self.taken()?;
+        run.progress.cancelled.store(true, Ordering::Relaxed);
+        Ok(Reply::text(format!("run {} is dropped\n", run.number)))
+    }
+
+    fn taken(&mut self) -> Result<Background, Trouble> {
+        self.background.take().ok_or_else(|| Trouble::plain("nothing runs in the background").hint(":infer &"))
+    }
+
+    /// The number of the run in the background, once that is over and has not been told yet: for a front end to say so.
+    pub fn is_background_done(&self) -> Option<u32> {
+        self.background.as_ref().filter(|b| b.status().is_done).map(|b| b.number)
+    }
+
+    /// The draws of the run in the background, or of the last one.
+    pub(super) fn latest_draws(&self) -> Option<ChainDraws> {
+        let running = self.background.as_ref().map(|b| b.kept.draws()).filter(|d| !d.rows.is_empty());
+        running.or_else(|| self.last.as_ref().map(|l| l.draws.clone()))
+    }
+
+    /// `:profile`.
+    pub(super) fn profile(&self) -> Result<Reply, Trouble> {
+        let Some(last) = &self.last else { return Err(Trouble::plain("nothing has run yet").hint(":infer")) };
+        let mut text = last.line();
+        let rate = (last.steps + last.warmup) as f64 / last.seconds;
+        text +=
+            &format!("{}, {} steps a second\n\n{}", seconds(last.seconds), number(rate), table::kernels(&last.kernels));
+        let sites = table::sites(&last.sites);
+        if !sites.is_empty() {
+            text += &format!("\n{sites}");
+        }
+        Ok(Reply::text(text))
+    }
+}
+
+impl Background {
+    fn status(&self) -> Status {
+        let seen = self.kept.seen();
+        Status {
+            steps: self.progress.steps.load(Ordering::Relaxed),
+            draws: seen.draws,
+            best: seen.best,
+            elapsed: self.began.elapsed(),
+            is_done: self.is_done.load(Ordering::SeqCst),
+        }
+    }
+
+    /// What is known of it, in a line.
+    fn line(&self) -> String {
+        let (s, seen) = (self.status(), self.kept.seen());
+        let state = if s.is_done { "done; `:stop` takes over its state" } else { "running" };
+        let mut line = format!("run {}, {}: {} steps", self.number, self.what, s.steps);
+        line += &drawn(&seen);
+        format!("{line}; {state}\n")
+    }
+}
+
+/// How many draws there are, how many were new states, and the best.
+fn drawn(seen: &Seen) -> String {
+    let Some(best) = seen.best.filter(|_| seen.draws > 0) else { return String::new() };
+    let share = 100.0 * seen.moved as f64 / seen.draws as f64;
+    format!(", {} draws ({share:.0}% new states), best log joint {}", seen.draws, number(best))
+}
+
+impl Finished {
+    /// What was done, in a line.
+    fn line(&self) -> String {
+        let warmup = if self.warmup > 0 { format!(" after {} of warm-up", self.warmup) } else { String::new() };
+        let (tried, accepted) = self.kernels.iter().fold((0, 0), |(p, a), k| (p + k.proposals, a + k.accepted));
+        let accepted = match tried {
+            0 => String::new(),
+            _ => format!(", {:.0}% of proposals accepted", 100.0 * accepted as f64 / tried as f64),
+        };
+        format!("{}: {} steps{warmup}{accepted}{}\n", self.what, self.steps, drawn(&self.seen))
+    }
+}

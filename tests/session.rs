@@ -1,0 +1,507 @@
+//! Sessions as a front end has them: what is entered, what is said, and that nothing changes where something is wrong.
+
+use pcadlang::Program;
+use pcadlang::session::{Reply, Session, Trouble};
+use pcadlang::trace::Stop;
+use std::sync::atomic::AtomicBool;
+use std::time::Duration;
+
+const LINE: &str = "let x = [0, 1, 2, 3];
+assume slope ~ normal(0, 5) #line;
+assume intercept ~ normal(0, 5) #line;
+assume wide ~ flip(0.2);
+assume noise = if wide { n ~ uniform(1, 3); n } else { 1 };
+observe normal(slope * x + intercept, noise) = [0.9, 3.2, 4.8, 7.1] as y;
+predict next ~ normal(slope * 4 + intercept, noise);
+";
+
+fn session(text: &str) -> Session {
+    Session::open(Program::named("<session>", text).unwrap(), 1, None).unwrap_or_else(|e| panic!("{e}")).0
+}
+
+fn line() -> Session {
+    session(LINE)
+}
+
+fn says(s: &mut Session, text: &str) -> String {
+    match s.enter(text) {
+        Ok(Reply { text, .. }) => text,
+        Err(e) => panic!("{text}: {e}"),
+    }
+}
+
+fn refuses(s: &mut Session, text: &str) -> String {
+    match s.enter(text) {
+        Ok(reply) => panic!("{text}: {}", reply.text),
+        Err(e) => e.to_string(),
+    }
+}
+
+/// Program, choices and log joint density, to the last bit.
+fn state(s: &Session) -> (String, Vec<String>, u64) {
+    let choices = s.trace().choices().into_iter().map(|(a, v, p)| format!("{a} {v:?} {:x}", p.to_bits())).collect();
+    (s.text().to_owned(), choices, s.trace().log_joint().to_bits())
+}
+
+#[test]
+fn an_error_leaves_everything_as_it_was() {
+    let mut s = line();
+    let before = state(&s);
+    let mut wrong = String::new();
+    for (text, why) in [
+        ("assume z ~ nomal(0, 1)", "normal"),
+        ("assume slope ~ normal(0, 1)", "bound twice"),
+        ("let a = [1, 2][7]", "7"),
+        ("assume z ~ normal(0, -1)", "sd"),
+        ("let = 3", "expected"),
+        ("observe normal(slope, 1) = ", "expected"),
+        ("data d = csv(\"nowhere.csv\")", "no such file"),
+        ("let deep = f(1); fn f(n) { f(n + 1) }", "nested"),
+        ("1 + ", "expected"),
+        ("slope + nothing_such", "nothing_such"),
+        (":flip @slop", "@slope"),
+        (":flip normal(0, 1)", "selection"),
+        (":set @slope \"steep\"", "does not fit"),
+        (":set @slope 1e400", "large"),
+        (":set @slope inf", "finite"),
+        (":set @wide 3", "does not fit"),
+        (":set size 3", "no param"),
+        (":why $line", "2 choices"),
+        (":infer mh(one(@nothing))", "nothing"),
+        (":infer { repeat 10 { jump(@slope); } }", "jump"),
+        (":infer { let k = 1 / [1, 2][5]; }", "5"),
+        (":stop", "nothing runs"),
+        (":plot slope", "nothing has run"),
+        (":undo", "nothing to undo"),
+        (":load nowhere", "nowhere.pcad"),
+        (":save no/such/folder/x", "no/such/folder/x"),
+        (":trce", ":trace"),
+        (":draw @slope", "takes nothing"),
+        ("sample [1][3]", "3"),
+        ("export slope to \"no/such/folder/x.txt\"", "x.txt"),
+        ("let fine = 2; sample [1][3];", "3"),
+    ] {
+        let said = s.enter(text).map_or_else(|e| e.to_string(), |r| format!("(accepted) {}", r.text));
+        if !said.contains(why) || said.starts_with("(accepted)") || state(&s) != before {
+            wrong += &format!("{text}: {why:?} is not in\n{said}\n");
+        }
+    }
+    assert!(wrong.is_empty(), "{wrong}");
+    assert!(says(&mut s, "slope").trim().parse::<f64>().is_ok(), "and the session goes on");
+}
+
+#[test]
+fn looking_changes_nothing() {
+    let mut s = line();
+    let before = state(&s);
+    for text in [
+        ":trace",
+        "@slope",
+        "$line",
+        ":why @wide",
+        ":list",
+        ":help",
+        ":doc normal",
+        ":doc :flip",
+        ":status",
+        "slope * 2",
+        "next",
+    ] {
+        assert!(!says(&mut s, text).is_empty(), "{text}");
+    }
+    assert!(says(&mut s, "fn(x) { x + slope }").contains("function"));
+    assert_eq!(state(&s), before);
+    assert_eq!(says(&mut s, "noise"), says(&mut s, "noise"), "a name has one value");
+    assert_ne!(says(&mut s, "next"), says(&mut s, "next"), "a prediction is drawn each time");
+}
+
+/// What is assumed is drawn at once, although nothing is observed, and stays while the program grows.
+#[test]
+fn a_program_grows_and_its_choices_stay() {
+    let mut s = Session::new(7, None).unwrap();
+    let a = says(&mut s, "assume a ~ normal(0, 1)");
+    assert!(a.starts_with("a = ") && a.contains("log joint"), "{a}");
+    let value = says(&mut s, "a");
+    assert_eq!(says(&mut s, "a"), value);
+    says(&mut s, "fn twice(x) {\n  2 * x\n}");
+    says(&mut s, "let t = twice(a)");
+    says(&mut s, "for i in 0 .. 3 { v[i] ~ normal(a, 1); }");
+    assert_eq!(says(&mut s, "v"), says(&mut s, "v"));
+    assert_eq!(says(&mut s, "a"), value);
+    let observed = says(&mut s, "observe normal(a, 0.5) = 2 as y;");
+    assert!(observed.starts_with("log joint "), "{observed}");
+    assert_eq!(says(&mut s, "a"), value);
+    assert_eq!(s.trace().choice_count(), 4);
+    assert!(says(&mut s, ":trace").contains("@y"));
+    let expected = "assume a ~ normal(0, 1);\nfn twice(x) {\n  2 * x\n}\nlet t = twice(a);\n";
+    assert!(s.text().starts_with(expected), "{}", s.text());
+    says(&mut s, "forget y");
+    assert!(!says(&mut s, ":trace").contains("@y"));
+    says(&mut s, "force @a = 3");
+    assert_eq!(says(&mut s, "a"), "3\n");
+}
+
+#[test]
+fn undo_restores_program_and_trace_to_the_last_bit() {
+    let mut s = line();
+    let mut states = vec![state(&s)];
+    let steps = [
+        "let double = 2 * slope",
+        ":set @slope 2.25",
+        ":set @y [1, 3, 5, 7]",
+        ":draw",
+        "observe normal(double, 1) = 4 as again",
+        ":infer drift(one($continuous)) 50",
+        "infer { repeat 20 { mh(one(@**)); } }",
+        ":set @slope 1.125",
+        "forget again",
+    ];
+    for text in steps {
+        says(&mut s, text);
+        assert_ne!(&state(&s), states.last().unwrap(), "{text}");
+        states.push(state(&s));
+    }
+    states.pop();
+    while let Some(before) = states.pop() {
+        says(&mut s, ":undo");
+        assert_eq!(state(&s), before);
+    }
+    assert!(refuses(&mut s, ":undo").contains("nothing to undo"));
+}
+
+/// What is said of a flip is what the trace knows, whether it is kept or not.
+#[test]
+fn flips_say_what_they_do() {
+    let mut s = line();
+    let (mut kept, mut left) = (0, 0);
+    for i in 0..60 {
+        let before = state(&s);
+        let said = says(&mut s, ["(none)", ":flip @slope", ":flip @wide", ":flip @**"][1 + i % 3]);
+        let last = said.lines().last().unwrap();
+        let change = said.lines().find(|l| l.starts_with("log joint")).unwrap();
+        let [old, new] =
+            [0, 1].map(|k| change["log joint ".len()..].split([' ', '(']).filter(|w| *w != "->").nth(k).unwrap());
+        let shown = pcadlang::report::number;
+        assert_eq!(old, shown(f64::from_bits(before.2)), "{said}");
+        let ratio: f64 = last.split("log ratio ").nth(1).unwrap().split(')').next().unwrap().parse().unwrap();
+        if last.starts_with("accepted") {
+            assert_eq!(new, shown(s.trace().log_joint()), "{said}");
+            kept += 1;
+        } else {
+            assert!(last.starts_with("rejected") && ratio < 0.0, "{said}");
+            assert_eq!(state(&s), before);
+            left += 1;
+        }
+        assert_eq!(s.trace().log_joint().to_bits(), s.trace().rerun().unwrap().log_joint().to_bits());
+    }
+    assert!(kept > 3 && left > 3, "{kept} {left}");
+}
+
+#[test]
+fn why_names_what_depends_on_a_choice() {
+    let mut s = line();
+    says(&mut s, ":set @wide true");
+    let wide = says(&mut s, ":why @wide");
+    assert!(wide.contains("@noise/n") && wide.contains("may come or go") && wide.contains("@y"), "{wide}");
+    let n = says(&mut s, ":why @noise/n");
+    assert!(n.contains("made from @wide") && n.contains("read by noise"), "{n}");
+}
+
+#[test]
+fn inference_in_the_background_leaves_the_state_until_it_is_asked_for() {
+    let mut s = line();
+    let before = state(&s);
+    assert_eq!(says(&mut s, ":infer mh(one(@**)) 400 &"), "run 1 in the background: mh(one(@**))\n");
+    assert_eq!(state(&s), before);
+    assert!(says(&mut s, ":trace").contains("@slope"));
+    assert!(refuses(&mut s, ":infer 10").contains("run 1"));
+    let done = says(&mut s, ":wait");
+    assert!(done.contains("400 steps, 400 draws") && done.contains("done"), "{done}");
+    assert_eq!(says(&mut s, ":status"), done);
+    assert_eq!(s.is_background_done(), Some(1));
+    assert_eq!(state(&s), before, "waiting is not taking over");
+    let stopped = says(&mut s, ":stop");
+    assert!(stopped.starts_with("run 1 is the state now") && stopped.contains("accepted"), "{stopped}");
+    assert_ne!(state(&s), before);
+    assert!(says(&mut s, ":plot slope").starts_with("slope: 400 draws, mean "));
+    assert!(refuses(&mut s, ":plot slop").contains("did you mean `slope`?"));
+    assert!(says(&mut s, ":profile").contains("mh(one(@**))"));
+    says(&mut s, ":undo");
+    assert_eq!(state(&s), before);
+
+    // One that would go on for ever, stopped; its draws can be looked at while it runs.
+    says(&mut s, ":infer drift(one($continuous)) 1000000000 &");
+    while !says(&mut s, ":status").contains("draws") {
+        std::thread::sleep(Duration::from_millis(5));
+    }
+    assert!(says(&mut s, ":plot log_joint").contains("draws"));
+    assert!(says(&mut s, ":stop").starts_with("run 2 is the state now"));
+    let last = state(&s);
+    says(&mut s, ":infer drift(one($continuous)) 1000000000 &");
+    assert_eq!(says(&mut s, ":drop"), "run 3 is dropped\n");
+    assert_eq!(state(&s), last);
+}
+
+#[test]
+fn what_belongs_to_another_program_is_not_taken_over() {
+    let mut s = line();
+    says(&mut s, ":infer mh(one(@**)) 50 &");
+    says(&mut s, "let more = slope + 1");
+    says(&mut s, ":wait");
+    let before = state(&s);
+    let why = refuses(&mut s, ":stop");
+    assert!(why.contains("run 1 is of the program as it was before it changed"), "{why}");
+    assert_eq!(state(&s), before);
+    // Back at the same program it would fit.
+    says(&mut s, ":undo");
+    says(&mut s, ":infer mh(one(@**)) 50 &");
+    says(&mut s, "let more = slope + 1");
+    says(&mut s, ":undo");
+    assert!(says(&mut s, ":stop").starts_with("run 2"));
+}
+
+/// The same lines with the same seed are the same session; no stream of random numbers is used twice.
+#[test]
+fn sessions_replay() {
+    let lines =
+        [":flip @slope", ":infer mh(one(@**)) 100", ":infer mh(one(@**)) 100", ":trace", "next", ":draw", ":trace"];
+    let run = || {
+        let mut s = line();
+        lines.map(|l| says(&mut s, l))
+    };
+    let first = run();
+    assert_eq!(first, run());
+    assert_ne!(first[1], first[2]);
+}
+
+#[test]
+fn plans_of_all_kinds_run() {
+    let mut s = line();
+    assert!(says(&mut s, ":infer 30").contains("the default plan"), "as it has none of its own");
+    says(&mut s, "infer quick { repeat 25 { mh(one(@**)); collect slope; } }");
+    assert!(s.text().contains("infer quick"));
+    assert!(says(&mut s, ":infer quick").starts_with("quick: 25 steps"));
+    assert!(says(&mut s, ":infer quick 7").starts_with("quick: 7 steps"));
+    let text = s.text().to_owned();
+    assert!(
+        says(&mut s, "infer { warmup 10 { drift(@slope); } repeat 12 { drift(@slope); } }")
+            .contains("12 steps after 10 of warm-up")
+    );
+    assert_eq!(s.text(), text, "a block without a name is no part of the program");
+    assert!(says(&mut s, ":infer { repeat 5 { gibbs(@wide); } }").starts_with("infer { … }: 5 steps"));
+    says(&mut s, "kernel both() { mh(one(@**)); drift(one($continuous)); }");
+    assert!(says(&mut s, ":infer both() 3").starts_with("both(): 6 steps"));
+    assert!(says(&mut s, ":infer nuts($continuous, max_depth = 3) 4").contains("4 steps"));
+}
+
+#[test]
+fn what_is_stopped_has_done_nothing() {
+    static FLAG: AtomicBool = AtomicBool::new(false);
+    let stop = Stop::new(&FLAG);
+    let open = Session::open(Program::named("<session>", LINE).unwrap(), 1, Some(stop));
+    let mut s = open.unwrap_or_else(|e| panic!("{e}")).0;
+    let before = state(&s);
+    let interrupted = |s: &mut Session, text: &str| {
+        stop.set(false);
+        let ends = std::thread::spawn(move || {
+            std::thread::sleep(Duration::from_millis(150));
+            stop.set(true);
+        });
+        let done = s.enter(text);
+        ends.join().unwrap();
+        stop.set(false);
+        assert!(matches!(done, Err(Trouble::Stopped)), "{text}: {done:?}");
+    };
+    interrupted(&mut s, ":infer mh(one(@**)) 1000000000");
+    assert_eq!(state(&s), before);
+    interrupted(&mut s, "let endless = fold(fn(a, i) { a + i }, 0, 0 .. 10000000)");
+    assert_eq!(state(&s), before);
+    // What runs in the background is not meant.
+    says(&mut s, ":infer mh(one(@**)) 1000000000 &");
+    interrupted(&mut s, ":wait");
+    assert!(says(&mut s, ":status").contains("running"));
+    assert!(says(&mut s, ":stop").contains("run 2"));
+}
+
+/// Values without bounds on paper are a line on the screen, and what cannot be built is an error.
+#[test]
+fn huge_values_are_no_trouble() {
+    let mut s = Session::new(1, None).unwrap();
+    says(&mut s, "let big = 0 .. 3000000");
+    assert!(says(&mut s, "big").contains("3000000 in all"));
+    says(&mut s, "let a = [\"x\", 1]");
+    for (name, inner) in [("b", "a"), ("c", "b"), ("d", "c"), ("e", "d"), ("f", "e"), ("g", "f"), ("h", "g")] {
+        says(&mut s, &format!("let {name} = [{inner}, {inner}, {inner}, {inner}, {inner}, {inner}, {inner}, {inner}]"));
+    }
+    assert!(says(&mut s, "h").chars().count() < 2100);
+    let before = state(&s);
+    refuses(&mut s, "fn f(n) { a ~ normal(0, 1); a + f(n + 1) } let deep = f(0)");
+    assert_eq!(state(&s), before);
+    assert!(says(&mut s, "1e300 * 1").contains("1e300"));
+}
+
+/// A state of probability zero is told, and does not end the session.
+#[test]
+fn impossible_states_are_told() {
+    let mut s = session("assume p ~ uniform(0, 1);");
+    says(&mut s, ":set @p 0.5");
+    let said = says(&mut s, "observe uniform(0, 0.1) = p as inside");
+    assert!(said.contains("probability zero, by @inside"), "{said}");
+    assert!(said.contains("log joint -inf"), "{said}");
+    let said = says(&mut s, ":set @p 0.05");
+    assert!(said.contains("log joint -inf ->"), "{said}");
+    // Old choices that lead where the program has no value are drawn anew.
+    says(&mut s, ":set @p 0.01");
+    let said = says(&mut s, "assume q ~ normal(0, log(p * 60))");
+    assert!(said.contains("all were drawn anew"), "{said}");
+}
+
+#[test]
+fn params_are_set_in_the_text() {
+    let mut s = session("param n: int = 3 \"how many\";\nassume xs ~ iid(normal(0, 1), n);\n");
+    assert_eq!(s.trace().choice_count(), 3);
+    says(&mut s, ":set n 5");
+    assert_eq!(s.trace().choice_count(), 5);
+    assert!(s.text().starts_with("param n: int = 5 \"how many\";"), "{}", s.text());
+    let before = state(&s);
+    assert!(refuses(&mut s, ":set n \"many\"").contains("whole number"));
+    assert_eq!(state(&s), before);
+}
+
+#[test]
+fn a_program_without_its_data_is_its_prior() {
+    let program = Program::named("p", "data ys: csv; assume a ~ normal(0, 1); observe normal(a, 1) = ys.y;").unwrap();
+    let (mut s, said) = Session::open(program, 1, None).unwrap();
+    assert!(said.text.contains("`ys` is not given"), "{}", said.text);
+    assert!(says(&mut s, ":trace").contains("@a"));
+}
+
+#[test]
+fn words_are_completed_where_they_stand() {
+    let mut s = session(
+        "fn spin(angle, speed = 2) { angle * speed } assume xs ~ iid(normal(0, 1), 3) #fast; observe normal(xs[0], 1) = 1 as seen;",
+    );
+    let words = |s: &Session, line: &str| {
+        let found = s.complete(line, line.len());
+        (line[found.start..].to_owned(), found.words)
+    };
+    let has = |s: &Session, line: &str, word: &str| words(s, line).1.iter().any(|w| w == word);
+    assert_eq!(words(&s, ":fl"), (":fl".into(), vec![":flip".into()]));
+    assert_eq!(words(&s, ":flip @xs[").1, ["@xs[0]", "@xs[1]", "@xs[2]"]);
+    assert_eq!(words(&s, "force @se").1, ["@seen"]);
+    assert_eq!(words(&s, ":trace $fa").1, ["$fast"]);
+    assert!(has(&s, "let y = sp", "spin") && has(&s, "obs", "observe") && has(&s, "let v = scene.ren", "scene.render"));
+    assert!(has(&s, "spin(1, sp", "speed = ") && has(&s, "spin(1, sp", "spin") && !has(&s, "spin(1); sp", "speed = "));
+    assert!(has(&s, "assume z ~ normal(0, ", "sd = ") && has(&s, ":infer nuts($continuous, max", "max_depth = "));
+    assert!(has(&s, ":doc norm", "normal") && !has(&s, "f(\"norm", "normal"));
+    assert!(has(&s, ":infer mh", "mh"));
+    let folder = std::env::temp_dir().join(format!("pcadlang-complete-{}", std::process::id()));
+    std::fs::create_dir_all(folder.join("inner")).unwrap();
+    for name in ["one.pcad", "two.png", "three.csv"] {
+        std::fs::write(folder.join(name), "").unwrap();
+    }
+    let at = folder.display().to_string();
+    assert_eq!(words(&s, &format!(":load {at}/")).1, [format!("{at}/inner/"), format!("{at}/one.pcad")]);
+    assert_eq!(words(&s, &format!("data d = csv(\"{at}/t")).1, [format!("{at}/three.csv"), format!("{at}/two.png")]);
+    assert_eq!(words(&s, &format!("include \"{at}/o")).1, [format!("{at}/one.pcad")]);
+    std::fs::remove_dir_all(&folder).unwrap();
+    says(&mut s, ":infer mh(one(@**)) 5");
+    assert!(has(&s, ":plot xs", "xs[1]"));
+    for line in ["", ":", "@", "\"", "é", "f(", "1.", ":load ", "let é = \"ü"] {
+        for at in 0..=line.len() {
+            s.complete(line, at);
+        }
+    }
+}
+
+#[test]
+fn sessions_are_saved_and_loaded() {
+    let folder = std::env::temp_dir().join(format!("pcadlang-session-{}", std::process::id()));
+    std::fs::create_dir_all(&folder).unwrap();
+    let at = |name: &str| folder.join(name).display().to_string();
+    let mut s = line();
+    says(&mut s, "let double = 2 * slope // twice");
+    says(&mut s, ":infer mh(one(@**)) 100");
+    let saved = state(&s);
+    let said = says(&mut s, &format!(":save {}", at("cup")));
+    assert!(said.contains("cup.pcad") && said.contains("cup.trace.json"), "{said}");
+    let mut other = Session::new(5, None).unwrap();
+    let said = says(&mut other, &format!(":load {}", at("cup.pcad")));
+    assert!(said.contains("with the trace of"), "{said}");
+    assert_eq!(state(&other), saved);
+    says(&mut other, ":undo");
+    assert_eq!(other.text(), "");
+    // A trace of another program, and one that is no trace.
+    std::fs::write(at("cup.pcad"), "assume other ~ normal(0, 1);").unwrap();
+    let before = state(&s);
+    let why = refuses(&mut s, &format!(":load {}", at("cup")));
+    assert!(why.contains("belongs to another program"), "{why}");
+    std::fs::write(at("cup.trace.json"), "{").unwrap();
+    assert!(refuses(&mut s, &format!(":load {}", at("cup"))).contains("not a saved trace"));
+    assert_eq!(state(&s), before);
+    std::fs::remove_file(at("cup.trace.json")).unwrap();
+    says(&mut s, &format!(":load {}", at("cup")));
+    assert_eq!(s.trace().choice_count(), 1);
+    std::fs::remove_dir_all(&folder).unwrap();
+}
+
+/// Data files are read once, and prepared once.
+#[test]
+fn files_are_read_once() {
+    let folder = std::env::temp_dir().join(format!("pcadlang-files-{}", std::process::id()));
+    std::fs::create_dir_all(&folder).unwrap();
+    let path = folder.join("d.csv");
+    std::fs::write(&path, "y\n1\n2\n").unwrap();
+    let mut s = Session::new(1, None).unwrap();
+    says(&mut s, &format!("data d = csv(\"{}\")", path.display()));
+    std::fs::remove_dir_all(&folder).unwrap();
+    says(&mut s, "observe normal(0, 1) = d.y");
+    assert_eq!(says(&mut s, "d.y"), "[1, 2]\n");
+}
+
+#[test]
+fn scenes_are_seen() {
+    let text = "include \"std/scene.pcad\" as scene;\nlet ball = scene.sphere(radius = 1);\nlet view = scene.render(ball);\nassume a ~ normal(0, 1);\n";
+    let mut s = session(text);
+    let reply = s.enter(":render").unwrap_or_else(|e| panic!("{e}"));
+    let picture = reply.picture.expect("a picture");
+    let pixels = picture.pixels();
+    let (w, h) = pixels.dimensions();
+    assert!(w >= 256 && h >= 256 && picture.file.is_none());
+    assert_ne!(pixels.get_pixel(w / 2, h / 2), pixels.get_pixel(2, 2), "the ball is in the middle");
+    let named = s.enter(":render ball out.png").unwrap_or_else(|e| panic!("{e}")).picture.unwrap();
+    assert_eq!(named.file.as_deref(), Some(std::path::Path::new("out.png")));
+    assert!(refuses(&mut s, ":render a").contains("a number"));
+    assert!(refuses(&mut s, ":render bal").contains("did you mean `ball`?"));
+    assert!(refuses(&mut Session::new(1, None).unwrap(), ":render").contains("no view"));
+}
+
+/// Names that are asked for by nobody but the session are kept up to date as observations are.
+#[test]
+fn shipped_programs_are_at_home() {
+    for name in [
+        "coin.pcad",
+        "linreg.pcad",
+        "mixture.pcad",
+        "crp.pcad",
+        "geometric.pcad",
+        "scene.pcad",
+        "lathe.pcad",
+        "human_kth.pcad",
+    ] {
+        let program = Program::open(name).unwrap_or_else(|e| panic!("{e}"));
+        let mut s = Session::open(program, 1, None).unwrap_or_else(|e| panic!("{name}: {e}")).0;
+        let addresses: Vec<String> = s.trace().choices().iter().map(|(a, ..)| a.to_string()).collect();
+        assert!(!addresses.is_empty(), "{name} has no choices");
+        for (i, a) in addresses.iter().cycle().step_by(7).take(12).enumerate() {
+            if s.trace().find(&a.parse().unwrap()).is_some() {
+                says(&mut s, &format!(":why {a}"));
+                says(&mut s, &format!(":flip {}", if i % 5 == 4 { "@**" } else { a }));
+            }
+            let (now, anew) = (s.trace().log_joint(), s.trace().rerun().unwrap().log_joint());
+            assert_eq!(now.to_bits(), anew.to_bits(), "{name} {a}: {now} {anew}");
+        }
+        says(&mut s, ":infer mh(one(@**)) 30");
+        assert_eq!(s.trace().log_joint().to_bits(), s.trace().rerun().unwrap().log_joint().to_bits(), "{name}");
+    }
+}
