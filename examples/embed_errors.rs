@@ -21,7 +21,7 @@ pub fn while_running() -> Option<String> {
 }
 
 fn main() {
-    for (line, column, message, hint) in mistakes("assume x ~ norml(0, 1);\nlet y = sqrt(x, 2);") {
+    for (line, column, message, hint) in mistakes("assume x ~ nromal(0, 1);\nlet y = sqrt(x, 2);") {
         println!("{line}:{column}: {message} ({})", hint.unwrap_or_default());
     }
     println!("{}", while_running().unwrap_or_default());

@@ -60,8 +60,8 @@ pub const PROGRAM: &str = "
     observe normal(rod(near), 1) = 58 as middle;
     observe normal(end, 0.2) = 53 as measured;
     infer {
-        warmup 300 { hmc(@far, steps = 4); drift(one(@far)); }
-        repeat 600 { hmc(@far, steps = 4); drift(one(@far)); drift(one(@near)); collect end, near, far; }
+        warmup 300 { hmc(@far, steps = 4); drift(one(@far)); every 20 { drift(one(@near)); } }
+        repeat 600 { hmc(@far, steps = 4); drift(one(@far)); every 20 { drift(one(@near)); } collect end, near, far; }
     }";
 
 /// The model.

@@ -172,7 +172,7 @@ fn a_run_is_watched_ended_and_left_in_its_folder() {
 
 #[test]
 fn errors_are_values_with_places() {
-    let found = embed_errors::mistakes("assume x ~ norml(0, 1);\nlet y = sqrt(x, 2);");
+    let found = embed_errors::mistakes("assume x ~ nromal(0, 1);\nlet y = sqrt(x, 2);");
     assert_eq!(found.len(), 2);
     assert_eq!((found[0].0, found[0].1), (1, 12));
     assert_eq!(found[0].3.as_deref(), Some("did you mean `normal`?"));

@@ -14,7 +14,7 @@
 //!     .about("The drag of a unit area.")
 //!     .gradient(move |a, _, by| Some(vec![Adjoint::Num(by.number() * density * a.num(0).ok()?)]));
 //! let host = Host::new().with(drag);
-//! let text = "assume v ~ normal(10, 2); observe normal(drag(v), 1) = 55; infer { repeat 500 { hmc(@v); } }";
+//! let text = "assume v ~ normal(10, 2); observe normal(drag(v), 1) = 55; infer { warmup 200 { hmc(@v); } repeat 500 { hmc(@v); } }";
 //! let model = Program::parse(text)?.host(&host)?.compile()?;
 //! let posterior = model.run(&Default::default(), 1, 1)?;
 //! let v = posterior.quantity("v").unwrap().summary.mean;

@@ -48,12 +48,11 @@ use std::sync::Arc;
 ///     .optional("sd", Type::Num, 20.0, "The noise.").unit("pixels");
 /// let text = r#"include "std/scene.pcad" as scene;
 ///     assume size ~ uniform(0.3, 2);
-///     let ball = scene.affine(scale = size) * scene.sphere();
+///     let ball = scene.affine(scale = size) * scene.sphere(1);
 ///     observe area(scene.render(ball)) = 800 as seen;
-///     infer { repeat 60 { hmc(@size, steps = 3); } }"#;
+///     infer { warmup 60 { hmc(@size, steps = 3); } repeat 60 { hmc(@size, steps = 3); } }"#;
 /// let model = Program::parse(text)?.host(&Host::new().with(area))?.compile()?;
 /// let size = model.run(&Default::default(), 1, 1)?.quantity("size").unwrap().summary.mean;
-/// let covered = model.simulate(0, 0)?;
 /// assert!((0.8..1.3).contains(&size), "{size}");
 /// # Ok::<(), pcadlang::Error>(())
 /// ```
@@ -109,7 +108,7 @@ impl Seen {
     /// .argument("view", Type::Object("a view"), "What is seen.");
     /// let text = r#"include "std/scene.pcad" as scene;
     ///     assume shift ~ normal(0, 0.01);
-    ///     observe normal(outline(scene.render(scene.affine(translate = [shift, 0, 0]) * scene.sphere())), 1) = 90;"#;
+    ///     observe normal(outline(scene.render(scene.affine(translate = [shift, 0, 0]) * scene.sphere(1))), 1) = 90;"#;
     /// Program::parse(text)?.host(&Host::new().with(outline))?.compile()?.simulate(0, 0)?;
     /// # Ok::<(), pcadlang::Error>(())
     /// ```

@@ -255,7 +255,7 @@ impl Graph {
     }
 
     /// What an incremental function may start from.
-    pub fn kept(&self, n: NodeId) -> Option<&Before> {
+    pub fn kept(&self, n: NodeId) -> Option<&Arc<Before>> {
         match self.nodes[n as usize].side.as_deref() {
             Some(Side::Kept(k)) if self.incremental => Some(&k.before),
             _ => None,

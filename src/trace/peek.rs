@@ -254,7 +254,7 @@ impl Graph {
             Op::Prim { builtin, args } => {
                 let values = self.peek_all(code, peek, value, frame, args)?;
                 let (builtin, values) = (code.builtins.get(*builtin), refs(&values));
-                let made = match builtin.resume(&values, self.kept(n)) {
+                let made = match builtin.resume(&values, self.kept(n).map(|b| &**b)) {
                     None => apply(builtin, &values),
                     Some(made) => made.map(|b| b.value),
                 };

@@ -141,10 +141,10 @@ impl Lowerer<'_> {
             Some(i) => (message[..i].to_owned(), message[i + 2..].to_owned()),
             None => (message, b.signature()),
         };
-        let unknown = args.iter().filter_map(|a| a.name.as_ref()).find(|n| !b.args.iter().any(|p| p.name == &*n.node));
+        let unknown = args.iter().filter_map(|a| a.name.as_ref()).find(|n| !b.args.iter().any(|p| p.name == *n.node));
         let again = args.iter().enumerate().find_map(|(i, a)| {
             let n = a.name.as_ref()?;
-            let place = b.args.iter().position(|p| p.name == &*n.node)?;
+            let place = b.args.iter().position(|p| p.name == *n.node)?;
             let earlier = args[..i].iter().any(|o| o.name.as_ref().is_some_and(|o| o.node == n.node));
             let positional = args[..i].get(place).is_some_and(|o| o.name.is_none());
             (earlier || positional).then_some(n.span)

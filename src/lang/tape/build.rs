@@ -6,7 +6,7 @@ use super::form::{Form, Made};
 use super::op::Op;
 use super::{Input, Sums, Tape};
 use crate::dist::{Dist, Support, batch, batch_of_mixture};
-use crate::lang::builtins::{Binary, Builtin, CovarianceValue, Derivative, Kind, Reduction, Scalar};
+use crate::lang::builtins::{Before, Binary, Builtin, CovarianceValue, Derivative, Kind, Reduction, Scalar};
 use crate::lang::value::Value;
 use crate::num::Column;
 use smallvec::SmallVec;
@@ -18,9 +18,16 @@ pub struct Builder {
     values: Vec<f64>,
     inputs: Vec<Input>,
     ops: Vec<Op>,
+    /// Whether incremental functions go on from where they were in the last run.
+    keeps: bool,
 }
 
 impl Builder {
+    /// A tape with nothing on it.
+    pub fn new(keeps: bool) -> Builder {
+        Builder { keeps, ..Builder::default() }
+    }
+
     /// The tape of all that was told.
     pub fn finish(self) -> Tape {
         let adjoints = vec![0.0; self.values.len()];
@@ -107,7 +114,13 @@ impl Builder {
         }
         if numeric(now) {
             let out = self.place(now)?;
-            self.ops.push(Op::Call { builtin: builtin.clone(), args: args.into(), out: out.clone(), before: None });
+            self.ops.push(Op::Call {
+                builtin: builtin.clone(),
+                args: args.into(),
+                out: out.clone(),
+                before: None,
+                keeps: self.keeps,
+            });
             return Some(out);
         }
         // What takes long to make is better made once.
@@ -118,6 +131,13 @@ impl Builder {
             _ => false,
         };
         cheap.then(|| Form::Made(Arc::new(Made { builtin: builtin.clone(), args: args.into() })))
+    }
+
+    /// The call told last may go on from this evaluation.
+    pub fn start_from(&mut self, evaluation: &Arc<Before>) {
+        if let Some(Op::Call { before, .. }) = self.ops.last_mut() {
+            *before = Some(Arc::clone(evaluation));
+        }
     }
 
     fn unary(&mut self, f: fn(f64) -> f64, slope: fn(f64, f64) -> f64, x: &Form) -> Option<Form> {

@@ -172,7 +172,10 @@ impl Form {
             }
             Form::List(all) => all.iter().enumerate().all(|(i, f)| f.pull(&by.element(i), buffer, adjoints)),
             Form::Record(all) => all.iter().all(|(name, f)| f.pull(&by.field(name), buffer, adjoints)),
-            Form::Made(m) => pull_call(&m.builtin, &m.args, by, buffer, adjoints),
+            Form::Made(m) => match call(&m.builtin, &m.args, buffer) {
+                Some((_, value)) => pull_call(&m.builtin, &m.args, value, by, buffer, adjoints),
+                None => false,
+            },
         }
     }
 
@@ -212,27 +215,36 @@ pub(super) fn call(builtin: &Builtin, args: &[Form], buffer: &[f64]) -> Option<(
     Some((values, value))
 }
 
-/// The result of a call, of an incremental function from where it was in the last run.
+/// The result of a call, of an incremental function from where it was in the last run if the tape keeps that.
 pub(super) fn call_from(
     builtin: &Builtin,
     args: &[Form],
     buffer: &[f64],
-    before: &mut Option<Box<Before>>,
+    before: &mut Option<Arc<Before>>,
+    keeps: bool,
 ) -> Option<Value> {
     let values: SmallVec<[Value; 4]> = args.iter().map(|f| f.value(buffer)).collect::<Option<_>>()?;
     let values: SmallVec<[&Value; 4]> = values.iter().collect();
-    match builtin.resume(&values, before.as_deref()) {
+    match builtin.resume(&values, before.as_deref().filter(|_| keeps)) {
         None => builtin.apply(&values).ok(),
         Some(made) => {
-            let made = before.insert(Box::new(made.ok()?));
+            let made = before.insert(Arc::new(made.ok()?));
             Some(made.value.clone())
         }
     }
 }
 
-/// Passes the adjoint of a call's result on to its arguments.
-pub(super) fn pull_call(builtin: &Builtin, args: &[Form], by: &Adjoint, buffer: &[f64], adjoints: &mut [f64]) -> bool {
-    let Some((values, value)) = call(builtin, args, buffer) else { return false };
+/// Passes the adjoint of a call's result, which is this value, on to its arguments.
+pub(super) fn pull_call(
+    builtin: &Builtin,
+    args: &[Form],
+    value: Value,
+    by: &Adjoint,
+    buffer: &[f64],
+    adjoints: &mut [f64],
+) -> bool {
+    let values: Option<SmallVec<[Value; 4]>> = args.iter().map(|f| f.value(buffer)).collect();
+    let Some(values) = values else { return false };
     let refs: SmallVec<[&Value; 4]> = values.iter().collect();
     let a = Args { builtin, values: &refs };
     let pulled = match (builtin.kind, &value) {

@@ -8,6 +8,7 @@ use crate::lang::density;
 use crate::lang::value::Value;
 use crate::num::{Column, ExactSum};
 use smallvec::SmallVec;
+use std::sync::Arc;
 
 /// An operation: it reads numbers that lie before those it writes.
 #[derive(Debug)]
@@ -23,7 +24,7 @@ pub(super) enum Op {
     /// Numbers from anywhere side by side.
     Gather { from: Box<[usize]>, out: usize },
     /// A call of any built-in whose result is of a form that lies in the buffer.
-    Call { builtin: Builtin, args: Box<[Form]>, out: Form, before: Option<Box<Before>> },
+    Call { builtin: Builtin, args: Box<[Form]>, out: Form, before: Option<Arc<Before>>, keeps: bool },
     /// What must be as it was when the tape was recorded.
     Guard { form: Form, value: Value },
     /// The log densities of numbers.
@@ -62,7 +63,7 @@ impl Op {
                 from.iter().enumerate().for_each(|(i, at)| v[*out + i] = v[*at]);
                 true
             }
-            Op::Call { builtin, args, out, before } => match call_from(builtin, args, v, before) {
+            Op::Call { builtin, args, out, before, keeps } => match call_from(builtin, args, v, before, *keeps) {
                 Some(value) => out.write(v, &value),
                 None => false,
             },
@@ -115,7 +116,7 @@ impl Op {
             }
             Op::Call { builtin, args, out, .. } => {
                 let by = out.adjoint(g);
-                pull_call(builtin, args, &by, v, g)
+                out.value(v).is_some_and(|value| pull_call(builtin, args, value, &by, v, g))
             }
             Op::Guard { .. } => true,
             Op::Density { batch, x, params, n, observed } => {

@@ -166,7 +166,7 @@ impl Graph {
 
     /// Calls a built-in at a node: an incremental function from where it was.
     fn apply_at(&self, n: NodeId, builtin: &Builtin, values: &[&Value]) -> Result<Made, Fault> {
-        match builtin.resume(values, self.kept(n)) {
+        match builtin.resume(values, self.kept(n).map(|b| &**b)) {
             None => builtin.apply(values).map(Made::Value),
             Some(made) => made.map(Made::Kept),
         }

@@ -93,7 +93,9 @@ impl Graph {
         let mut own: FxHashMap<NodeId, Option<Own>> = targets.iter().map(|t| (t.node, None)).collect();
         while let Some(n) = pass.order.pop() {
             let by = pass.adjoints.remove(&n).unwrap_or_default();
-            if by.is_unknown() {
+            // A likelihood may leave out some of its arguments: that matters if these depend on a target.
+            let in_parts = matches!((&self.nodes[n as usize].value, &by), (Value::Likelihood(_), Adjoint::List(_)));
+            if by.is_unknown() && !in_parts {
                 return Err(pass.no_derivative(n, "what is made of this"));
             }
             if let Some(place) = own.get_mut(&n) {

@@ -50,7 +50,7 @@ impl Graph {
             reached: reached.iter().copied().collect(),
             placed: FxHashMap::default(),
             forms: FxHashMap::default(),
-            tape: Builder::default(),
+            tape: Builder::new(self.incremental),
         };
         for t in targets {
             r.place(*t)?;
@@ -167,7 +167,12 @@ impl Recorder<'_> {
         match graph.op(code, n) {
             Op::Prim { builtin, args } => {
                 let args = self.operands(frame, args);
-                self.tape.call(code.builtins.get(*builtin), args, &now)
+                let form = self.tape.call(code.builtins.get(*builtin), args, &now)?;
+                let has_place = !matches!(form, Form::Fixed(_) | Form::Made(_));
+                if let Some(before) = graph.kept(n).filter(|_| has_place) {
+                    self.tape.start_from(before);
+                }
+                Some(form)
             }
             Op::Array(items) => {
                 let all = self.operands(frame, items);
