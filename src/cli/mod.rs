@@ -9,20 +9,23 @@ mod doc;
 mod earlier;
 mod evaluate;
 mod files;
+mod fmt;
 mod given;
 mod job;
 mod keypoints;
 mod learn;
+mod manual;
 mod predict;
 mod progress;
 mod run;
 mod sample;
 mod scene;
 mod term;
+mod watch;
 
 use args::{Cli, Command};
 use pcadlang::Error;
-use std::fmt;
+use std::fmt::{Display, Formatter};
 use std::process::ExitCode;
 use term::has_colors;
 
@@ -37,8 +40,8 @@ pub enum Failure {
 }
 
 /// What went wrong, without colours and without a line end.
-impl fmt::Display for Failure {
-    fn fmt(&self, f: &mut fmt::Formatter<'_>) -> fmt::Result {
+impl Display for Failure {
+    fn fmt(&self, f: &mut Formatter<'_>) -> std::fmt::Result {
         match self {
             Failure::Program(e) => f.write_str(e.to_string().trim_end()),
             Failure::Plain(message, _) => f.write_str(message),
@@ -66,10 +69,14 @@ pub fn main(cli: Cli) -> ExitCode {
         Command::Sample(a) => sample::sample(&a),
         Command::Learn(a) => learn::learn(&a),
         Command::Check(a) if a.sbc || a.geweke => calibrate::calibrate(&a),
+        Command::Check(a) if a.watch => watch::watch(&a),
         Command::Check(a) => check::check(&a),
         Command::Predict(a) => predict::predict(&a),
         Command::Contours(a) => contours::contours(&a),
         Command::Doc(a) => doc::doc(&a),
+        Command::Fmt(a) => fmt::fmt(&a),
+        Command::Completions(a) => manual::completions(&a),
+        Command::Man(a) => manual::man(&a),
     };
     match done {
         Ok(()) => ExitCode::SUCCESS,

@@ -45,3 +45,4 @@ pub use rundir::{RunDir, RunDirError};
 pub use sinks::{Memory, Tee};
 #[doc(hidden)]
 pub use warnings::warnings;
+pub use whole::write_whole;
