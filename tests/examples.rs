@@ -51,7 +51,7 @@ fn names(text: &str) -> impl Iterator<Item = &str> {
 /// A value is something; a shape or view shows something.
 fn is_seen(value: &Value) -> Result<(), String> {
     match as_view(value, None) {
-        Ok(view) if view.contours(64).is_empty() => Err("nothing of it is seen".into()),
+        Some(view) if view.contours(64).is_empty() => Err("nothing of it is seen".into()),
         _ if matches!(value, Value::Unit) => Err("it is nothing".into()),
         _ => Ok(()),
     }

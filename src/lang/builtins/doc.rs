@@ -36,7 +36,9 @@ fn entry(b: &Builtin) -> String {
         let _ = write!(s, "\n{what}: {text}\n");
     }
     if let Some(example) = b.example() {
-        let include = if example.contains("scene.") { format!("  {INCLUDE}\n") } else { String::new() };
+        // An expression is no program yet.
+        let include =
+            if example.contains("scene.") && example.contains(';') { format!("  {INCLUDE}\n") } else { String::new() };
         let _ = write!(s, "\nExample:\n\n{include}{}", indented(example, "  "));
     }
     s
@@ -75,7 +77,7 @@ pub fn reference(table: &Table) -> String {
                 let _ = writeln!(s, "  - *{what}*: {text}");
             }
             if let Some(example) = b.example() {
-                let _ = write!(s, "\n{}\n", indented(example, "      "));
+                let _ = writeln!(s, "  ```pcad\n{}  ```", indented(example, "  "));
             }
         }
     }

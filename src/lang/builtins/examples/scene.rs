@@ -88,7 +88,7 @@ let view = scene.render(scene.box(1), camera = above);",
 data points = keypoints(\"person.json\");
 data body = armature(\"std/human/human.lod2.rig.json\");
 assume turn ~ uniform(-pi, pi);
-let placed = scene.affine(rotate = [0, turn, 0], scale = 2) * scene.affine(translate = [0, -0.9, 0]);
+let placed = scene.affine(translate = [0, -1.8, 0], rotate = [0, turn, 0], scale = 2);
 let view = scene.render(placed * scene.skin(body, { head: [deg(20), 0, 0] }));
 observe scene.keypoints(view) = points as joints;",
     ),
