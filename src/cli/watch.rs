@@ -5,9 +5,9 @@ use super::job::Interrupt;
 use super::{Failure, check, term};
 use pcadlang::diag::SourceMap;
 use pcadlang::lang::load::{Disk, Loader, load};
-use std::cell::RefCell;
 use std::collections::BTreeMap;
 use std::io::{self, IsTerminal};
+use std::sync::{Mutex, PoisonError};
 use std::time::{Duration, SystemTime};
 
 /// How often files are looked at.
@@ -61,7 +61,7 @@ impl Seen {
         for program in programs {
             let _ = load(program, &asked, &mut SourceMap::new());
         }
-        Seen(asked.0.into_inner())
+        Seen(asked.0.into_inner().unwrap_or_else(PoisonError::into_inner))
     }
 
     /// The files that are not as they were.
@@ -72,11 +72,12 @@ impl Seen {
 
 /// Reads from the file system and remembers what it was asked for.
 #[derive(Default)]
-struct Asked(RefCell<BTreeMap<String, Stamp>>);
+struct Asked(Mutex<BTreeMap<String, Stamp>>);
 
 impl Loader for Asked {
     fn read(&self, path: &str) -> io::Result<Vec<u8>> {
-        self.0.borrow_mut().entry(path.to_owned()).or_insert_with(|| stamp(path));
+        let mut asked = self.0.lock().unwrap_or_else(PoisonError::into_inner);
+        asked.entry(path.to_owned()).or_insert_with(|| stamp(path));
         Disk.read(path)
     }
 }

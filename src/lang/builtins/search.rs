@@ -58,13 +58,13 @@ struct Text<'t> {
 
 impl<'t> Text<'t> {
     fn new(of: &'t Builtin) -> Self {
-        let args = of.args.iter().flat_map(|arg| words_of(arg.name).chain(words_of(arg.doc)));
+        let args = of.args.iter().flat_map(|arg| words_of(&arg.name).chain(words_of(&arg.doc)));
         Text {
             of,
             name: of.name.to_lowercase(),
-            parts: words_of(of.name).chain(words_of(of.module)).collect(),
-            section: words_of(of.section).collect(),
-            doc: words_of(of.doc).collect(),
+            parts: words_of(&of.name).chain(words_of(&of.module)).collect(),
+            section: words_of(&of.section).collect(),
+            doc: words_of(&of.doc).collect(),
             args: args.collect(),
         }
     }

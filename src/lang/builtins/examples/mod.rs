@@ -17,8 +17,11 @@ pub const INCLUDE: &str = "include \"std/scene.pcad\" as scene;";
 type Examples = &'static [(&'static str, &'static str)];
 
 impl Builtin {
-    /// An example of its use.
+    /// An example of its use, if it is the language's own.
     pub fn example(&self) -> Option<&'static str> {
+        if self.foreign.is_some() {
+            return None;
+        }
         let name = self.full_name();
         [values::EXAMPLES, distributions::EXAMPLES, inference::EXAMPLES, scene::EXAMPLES]
             .into_iter()
