@@ -64,9 +64,14 @@ fn doc() {
             &["doc", "scene.lathe"],
             &["doc", "lathe"],
             &["doc", "pi"],
+            &["doc", "mh"],
             &["doc", "nothing"],
             &["doc", "nomal"],
             &["doc", ""],
+            &["doc", "--search", "mean", "direction"],
+            &["doc", "--search", "gaussian", "random", "walk"],
+            &["doc", "--search", "chamfr"],
+            &["doc", "--search", "qqqqqq"],
         ],
     );
     let f = Folder::new("doc_all");
@@ -76,7 +81,7 @@ fn doc() {
 
 #[test]
 fn help() {
-    let all: [&[&str]; 11] = [
+    let all: [&[&str]; 14] = [
         &["--help"],
         &["run", "--help"],
         &["evaluate", "--help"],
@@ -87,9 +92,114 @@ fn help() {
         &["contours", "--help"],
         &["doc", "--help"],
         &["repl", "--help"],
+        &["fmt", "--help"],
+        &["completions", "--help"],
+        &["man", "--help"],
         &["--version"],
     ];
     sessions("help", &all);
+}
+
+#[test]
+fn programs_are_formatted_in_place() {
+    let f = Folder::new("fmt");
+    std::fs::create_dir(f.path().join("more")).unwrap();
+    f.write("ugly.pcad", "let  a=1 ; // one\n").write("good.pcad", "let a = 1;\n").write("more/deep.pcad", "f( 1,2 );");
+    f.write("bad.pcad", "let a = ;\n").write("notes.txt", "let  a=1 ;");
+    let said: Vec<String> = [
+        &["fmt", "--check", "."][..],
+        &["fmt", "--check", "good.pcad"],
+        &["fmt", "."],
+        &["fmt", "ugly.pcad", "good.pcad", "more"],
+        &["fmt", "--check", "more", "none.pcad"],
+        &["fmt"],
+    ]
+    .iter()
+    .map(|args| session(&f, args))
+    .collect();
+    snapshot("fmt", &said.join("\n"));
+    assert_eq!(f.read("ugly.pcad"), "let a = 1; // one\n");
+    assert_eq!(f.read("more/deep.pcad"), "f(1, 2);\n");
+    assert_eq!((f.read("bad.pcad"), f.read("notes.txt")), ("let a = ;\n".into(), "let  a=1 ;".into()));
+    assert_eq!(f.files(), ["bad.pcad", "good.pcad", "more/", "more/deep.pcad", "notes.txt", "ugly.pcad"]);
+}
+
+#[test]
+fn standard_input_is_formatted() {
+    let fmt = |text: &str, args: &[&str]| {
+        let mut command = assert_cmd::Command::cargo_bin("pcadlang").unwrap();
+        command.args(["fmt", "--stdin"]).args(args).write_stdin(text).output().unwrap()
+    };
+    assert_eq!(fmt("let  a=1 ;", &[]).stdout, b"let a = 1;\n");
+    assert_eq!(fmt("let a = 1;\n", &["--check"]).status.code(), Some(0));
+    assert_eq!(fmt("let  a=1 ;", &["--check"]).status.code(), Some(1));
+    let bad = fmt("let a = ;", &[]);
+    assert!(bad.status.code() == Some(1) && bad.stdout.is_empty());
+    assert!(String::from_utf8_lossy(&bad.stderr).contains("<stdin>:1:9"), "{}", String::from_utf8_lossy(&bad.stderr));
+}
+
+/// Checked again when an included file changes, until the user ends it.
+#[cfg(unix)]
+#[test]
+fn watched_programs_are_checked_again() {
+    use std::process::{Command, Stdio};
+    use std::time::Duration;
+    let f = Folder::new("watch");
+    f.write("main.pcad", "include \"part.pcad\"; assume x ~ normal(width, 1);").write("part.pcad", "let with = 1;");
+    let out = std::fs::File::create(f.path().join("out")).unwrap();
+    let mut child = Command::new(env!("CARGO_BIN_EXE_pcadlang"))
+        .args(["check", "--watch", "main.pcad"])
+        .current_dir(f.path())
+        .stdout(out)
+        .stderr(Stdio::null())
+        .spawn()
+        .unwrap();
+    let comes = |text: &str| {
+        (0..300).any(|_| {
+            std::thread::sleep(Duration::from_millis(100));
+            f.read("out").contains(text)
+        })
+    };
+    assert!(comes("Watching 2 files") && !f.read("out").contains("no mistakes"), "{}", f.read("out"));
+    f.write("part.pcad", "let width = 1;");
+    assert!(comes("main.pcad: no mistakes found"), "{}", f.read("out"));
+    assert!(f.read("out").contains("Changed: part.pcad"));
+    assert!(Command::new("kill").args(["-INT", &child.id().to_string()]).status().unwrap().success());
+    assert_eq!(child.wait().unwrap().code(), Some(0));
+}
+
+#[test]
+fn completions_and_manual_pages_know_every_command() {
+    let f = Folder::new("manual");
+    let help = f.succeeds(&["--help"]).out;
+    let commands = help.lines().skip_while(|line| *line != "Commands:").skip(1).take_while(|line| !line.is_empty());
+    let commands: Vec<&str> =
+        commands.filter_map(|line| line.split_whitespace().next()).filter(|c| *c != "help").collect();
+    assert!(commands.contains(&"run") && commands.contains(&"fmt") && commands.len() > 10, "{commands:?}");
+    for shell in ["bash", "zsh", "fish", "powershell", "elvish"] {
+        let script = f.succeeds(&["completions", shell]).out;
+        assert!(commands.iter().all(|c| script.contains(c)) && script.contains("observe"), "{shell}:\n{script}");
+    }
+    // Programs complete to files.
+    let zsh = f.succeeds(&["completions", "zsh"]).out;
+    assert!(zsh.lines().any(|line| line.contains(":program -- ") && line.contains(":_files")), "{zsh}");
+    let page = f.succeeds(&["man"]).out;
+    assert!(
+        page.contains(".TH pcadlang 1") && commands.iter().all(|c| page.contains(&format!("pcadlang\\-{c}(1)"))),
+        "{page}"
+    );
+    f.succeeds(&["man", "--out", "pages"]);
+    for command in &commands {
+        let page = f.read(&format!("pages/pcadlang-{command}.1"));
+        assert!(
+            page.contains(&format!(".TH pcadlang-{command} 1"))
+                && page.contains(".SH SYNOPSIS")
+                && page.contains("pcadlang 0."),
+            "{page}"
+        );
+        assert!(page.contains(&format!("pcadlang {command}")), "the synopsis says how it is called: {page}");
+    }
+    assert_eq!(f.files().len(), commands.len() + 2, "{:?}", f.files());
 }
 
 /// Plans on data simulated from their programs: exit code 0 where they pass, 1 where not and where nothing can be simulated.
@@ -150,6 +260,7 @@ fn usage() {
         &[
             &[],
             &["rum"],
+            &["completions", "tcsh"],
             &["run"],
             &["check"],
             &["run", "coin.pcad", "--step", "3"],

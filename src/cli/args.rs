@@ -1,6 +1,6 @@
 //! The command line.
 
-use clap::{Args, Parser, Subcommand};
+use clap::{Args, Parser, Subcommand, ValueHint};
 use std::path::PathBuf;
 use std::time::Duration;
 
@@ -30,17 +30,23 @@ pub enum Command {
     Predict(Predict),
     /// Find the contours of a photograph
     Contours(Contours),
-    /// Explain a built-in, or list all of them
+    /// Explain a built-in, search for some, or list all of them
     Doc(Doc),
     /// Explore a program at a prompt: `:help` there lists what can be done
     Repl(Repl),
+    /// Format programs: spaces and line ends; comments stay
+    Fmt(Fmt),
+    /// Print a script that completes commands in a shell
+    Completions(Completions),
+    /// Print the manual page, or write one for every command
+    Man(Man),
 }
 
 /// What a program is given.
 #[derive(Args, Clone, Debug)]
 pub struct Given {
     /// The program: a file, or the name of a shipped one such as lathe.pcad
-    #[arg(value_name = "PROG")]
+    #[arg(value_name = "PROG", value_hint = ValueHint::FilePath)]
     pub program: String,
     /// Set a `param`, its value as in a program; may be repeated
     #[arg(long = "set", value_name = "NAME=VALUE", value_parser = pair)]
@@ -235,8 +241,11 @@ pub enum FeatureKind {
 #[command(after_help = CHECKS)]
 pub struct Check {
     /// The programs
-    #[arg(required = true, value_name = "PROG")]
+    #[arg(required = true, value_name = "PROG", value_hint = ValueHint::FilePath)]
     pub programs: Vec<String>,
+    /// Check again whenever a file of a program changes, until interrupted
+    #[arg(long, conflicts_with_all = ["sbc", "geweke"])]
+    pub watch: bool,
     /// Run the plan on data simulated from the program and rank the true values among the draws
     #[arg(long)]
     pub sbc: bool,
@@ -305,6 +314,38 @@ pub struct Contours {
 pub struct Doc {
     /// The name of a built-in; all of them, as Markdown, if left out
     pub name: Option<String>,
+    /// Find built-ins by words in their names, sections and descriptions
+    #[arg(long, value_name = "WORDS", num_args = 1.., conflicts_with = "name")]
+    pub search: Option<Vec<String>>,
+}
+
+/// `fmt`.
+#[derive(Args, Debug)]
+pub struct Fmt {
+    /// Programs, and folders with programs in them
+    #[arg(value_name = "FILE", value_hint = ValueHint::AnyPath, required_unless_present = "stdin")]
+    pub paths: Vec<PathBuf>,
+    /// Change nothing; name the files that would change, and exit with 1 if there are any
+    #[arg(long)]
+    pub check: bool,
+    /// Read a program from standard input and write it to standard output
+    #[arg(long, conflicts_with = "paths")]
+    pub stdin: bool,
+}
+
+/// `completions`.
+#[derive(Args, Debug)]
+pub struct Completions {
+    /// The shell
+    pub shell: clap_complete::Shell,
+}
+
+/// `man`.
+#[derive(Args, Debug)]
+pub struct Man {
+    /// The folder to write pages to, one for each command: pcadlang.1, pcadlang-run.1, …
+    #[arg(long, value_name = "DIR", value_hint = ValueHint::DirPath)]
+    pub out: Option<PathBuf>,
 }
 
 /// `repl`.

@@ -2,11 +2,15 @@
 
 use super::args::Doc;
 use super::{Failure, plain};
+use pcadlang::lang::builtins::search::search;
 use pcadlang::lang::builtins::{Table, doc as docs};
 
 /// Prints what the table of built-ins says.
 pub fn doc(a: &Doc) -> Result<(), Failure> {
     let table = Table::default();
+    if let Some(words) = &a.search {
+        return find(&table, &words.join(" "));
+    }
     let Some(name) = &a.name else {
         print!("{}", docs::reference(&table));
         return Ok(());
@@ -19,11 +23,37 @@ pub fn doc(a: &Doc) -> Result<(), Failure> {
         None => {
             let names: Vec<String> = table.iter().map(|b| b.full_name()).collect();
             let near = pcadlang::diag::nearest(name, names.iter().map(String::as_str));
-            let hint = near.map_or("`pcadlang doc` lists all of them".into(), |n| format!("did you mean `{n}`?"));
+            let search = || format!("`pcadlang doc --search {name}` looks in descriptions too");
+            let hint = near.map_or_else(search, |n| format!("did you mean `{n}`?"));
             match name.as_str() {
                 "" => Err(plain("a name is needed")),
                 _ => Err(Failure::Plain(format!("there is no built-in `{name}`"), Some(hint))),
             }
         }
+    }
+}
+
+/// At most so many are listed.
+const LISTED: usize = 20;
+
+/// Lists what has the words, the best first.
+fn find(table: &Table, words: &str) -> Result<(), Failure> {
+    let found = search(table, words);
+    for (word, near) in &found.instead {
+        println!("Nothing says \"{word}\"; \"{near}\" is looked for.\n");
+    }
+    for word in found.unknown.iter().filter(|_| !found.entries.is_empty()) {
+        println!("Nothing says \"{word}\".\n");
+    }
+    for b in found.entries.iter().take(LISTED) {
+        println!("{}\n    {}", b.signature(), b.doc);
+    }
+    match found.entries.len() {
+        0 => Err(Failure::Plain(format!("no built-in has {words:?}"), Some("`pcadlang doc` lists all of them".into()))),
+        n if n > LISTED => {
+            println!("… and {} more; another word narrows it down", n - LISTED);
+            Ok(())
+        }
+        _ => Ok(()),
     }
 }

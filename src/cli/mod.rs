@@ -9,10 +9,12 @@ mod doc;
 mod earlier;
 mod evaluate;
 mod files;
+mod fmt;
 mod given;
 mod job;
 mod keypoints;
 mod learn;
+mod manual;
 mod predict;
 mod progress;
 mod repl;
@@ -20,10 +22,11 @@ mod run;
 mod sample;
 mod scene;
 mod term;
+mod watch;
 
 use args::{Cli, Command};
 use pcadlang::Error;
-use std::fmt;
+use std::fmt::{Display, Formatter};
 use std::process::ExitCode;
 use term::has_colors;
 
@@ -38,8 +41,8 @@ pub enum Failure {
 }
 
 /// What went wrong, without colours and without a line end.
-impl fmt::Display for Failure {
-    fn fmt(&self, f: &mut fmt::Formatter<'_>) -> fmt::Result {
+impl Display for Failure {
+    fn fmt(&self, f: &mut Formatter<'_>) -> std::fmt::Result {
         match self {
             Failure::Program(e) => f.write_str(e.to_string().trim_end()),
             Failure::Plain(message, _) => f.write_str(message),
@@ -67,11 +70,15 @@ pub fn main(cli: Cli) -> ExitCode {
         Command::Sample(a) => sample::sample(&a),
         Command::Learn(a) => learn::learn(&a),
         Command::Check(a) if a.sbc || a.geweke => calibrate::calibrate(&a),
+        Command::Check(a) if a.watch => watch::watch(&a),
         Command::Check(a) => check::check(&a),
         Command::Predict(a) => predict::predict(&a),
         Command::Contours(a) => contours::contours(&a),
         Command::Doc(a) => doc::doc(&a),
         Command::Repl(a) => repl::repl(&a),
+        Command::Fmt(a) => fmt::fmt(&a),
+        Command::Completions(a) => manual::completions(&a),
+        Command::Man(a) => manual::man(&a),
     };
     match done {
         Ok(()) => ExitCode::SUCCESS,

@@ -45,4 +45,5 @@ pub use rundir::{RunDir, RunDirError};
 pub use sinks::{Memory, Tee};
 #[doc(hidden)]
 pub use warnings::warnings;
+#[doc(hidden)]
 pub use whole::write_file;

@@ -6,14 +6,20 @@ use std::path::Path;
 /// The ending of files that are being written.
 const PARTIAL: &str = ".partial";
 
-/// Writes a file of a folder; an older one of the name is kept if that fails.
-pub(super) fn write_whole(folder: &Path, name: &str, bytes: &[u8]) -> io::Result<()> {
+/// Writes a file of a folder; an older one of the name is kept if that fails, and lends the new one its permissions.
+///
+/// # Errors
+/// As the file system has it.
+pub fn write_whole(folder: &Path, name: &str, bytes: &[u8]) -> io::Result<()> {
     let (path, partial) = (folder.join(name), folder.join(format!(".{name}{PARTIAL}")));
     let mut written = std::fs::File::create(&partial).and_then(|mut f| {
         f.write_all(bytes)?;
         // The new name must not reach the disk before what it is of.
         f.sync_data()
     });
+    if let (Ok(()), Ok(older)) = (&written, std::fs::metadata(&path)) {
+        written = std::fs::set_permissions(&partial, older.permissions());
+    }
     if written.is_ok() {
         written = std::fs::rename(&partial, &path);
     }

@@ -2,7 +2,7 @@
 //!
 //! The way of a text: `lexer` makes tokens (with `string`, `address`), `delimiters` matches their brackets,
 //! the parser generated from `grammar/pcad.lalrpop` builds the tree through `build`, and `recover` repairs and
-//! parses again where it does not fit, with `advice` on what was probably meant. [`print`](print()) is the way back.
+//! parses again where it does not fit, with `advice` on what was probably meant. `format` is the way back.
 
 mod address;
 mod advice;
@@ -13,9 +13,9 @@ mod delimiters;
 mod entry;
 mod error;
 mod expected;
+mod format;
 mod lexer;
 mod parse;
-mod print;
 mod recover;
 pub mod span;
 mod string;
@@ -25,9 +25,9 @@ pub use deep::MAX_DEPTH;
 pub use delimiters::MAX_NESTING;
 pub use entry::{Class, classes, goes_on, is_directive};
 pub use error::{AddressError, MAX_ERRORS, SyntaxError, SyntaxErrorKind};
+pub use format::{WIDTH, format, print, print_expr};
 pub use lexer::MAX_TOKENS;
 pub use parse::{parse, parse_expr};
-pub use print::{print, print_expr};
 pub(crate) use token::{is_keyword, is_name};
 
 lalrpop_util::lalrpop_mod!(

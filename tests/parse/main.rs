@@ -1,6 +1,7 @@
 //! The parser against its specification: the sample programs, precedence, spans, printing, recovery, limits, rubbish.
 //! What is said about mistakes is tested in `tests/errors.rs`.
 
+mod formatting;
 mod fuzz;
 mod generator;
 mod limits;

@@ -1,5 +1,6 @@
 //! The language reference, made from the table of built-ins: one entry for `pcadlang doc`, and the whole as Markdown.
 
+use super::examples::INCLUDE;
 use super::{Argument, Builtin, Kind, Table, Type};
 use std::fmt::Write;
 
@@ -34,7 +35,18 @@ fn entry(b: &Builtin) -> String {
     for (what, text) in notes(b) {
         let _ = write!(s, "\n{what}: {text}\n");
     }
+    if let Some(example) = b.example() {
+        // An expression is no program yet.
+        let include =
+            if example.contains("scene.") && example.contains(';') { format!("  {INCLUDE}\n") } else { String::new() };
+        let _ = write!(s, "\nExample:\n\n{include}{}", indented(example, "  "));
+    }
     s
+}
+
+/// The lines of a text, further in.
+fn indented(text: &str, by: &str) -> String {
+    text.lines().map(|line| format!("{by}{line}\n")).collect()
 }
 
 /// The reference of every built-in, by section, as Markdown.
@@ -63,6 +75,9 @@ pub fn reference(table: &Table) -> String {
             }
             for (what, text) in notes(b) {
                 let _ = writeln!(s, "  - *{what}*: {text}");
+            }
+            if let Some(example) = b.example() {
+                let _ = writeln!(s, "  ```pcad\n{}  ```", indented(example, "  "));
             }
         }
     }

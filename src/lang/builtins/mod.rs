@@ -10,6 +10,7 @@ mod derivative;
 mod distributions;
 pub mod doc;
 mod elementwise;
+pub mod examples;
 mod foreign;
 mod forms;
 mod inference;
@@ -21,6 +22,7 @@ mod operators;
 mod reduce;
 mod row;
 pub mod scene;
+pub mod search;
 mod table;
 
 pub use args::Args;

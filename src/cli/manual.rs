@@ -1,0 +1,44 @@
+//! `pcadlang completions` and `pcadlang man`.
+
+use super::args::{Cli, Completions, Man};
+use super::{Failure, files, plain};
+use clap::CommandFactory;
+use std::io::Write;
+
+/// Prints what a shell reads to complete commands, options and files.
+pub fn completions(a: &Completions) -> Result<(), Failure> {
+    let mut script = Vec::new();
+    clap_complete::generate(a.shell, &mut Cli::command(), "pcadlang", &mut script);
+    print(&script)
+}
+
+/// Prints the manual page of the command, or writes those of all commands to a folder.
+pub fn man(a: &Man) -> Result<(), Failure> {
+    let mut command = Cli::command().disable_help_subcommand(true);
+    command.build();
+    let Some(folder) = &a.out else { return print(&page(&command)?) };
+    std::fs::create_dir_all(folder).map_err(|e| plain(format!("cannot make {}: {e}", folder.display())))?;
+    files::write(&folder.join("pcadlang.1"), &page(&command)?)?;
+    for sub in command.get_subcommands() {
+        let name = format!("pcadlang-{}", sub.get_name());
+        files::write(&folder.join(format!("{name}.1")), &page(&sub.clone().display_name(name))?)?;
+    }
+    Ok(())
+}
+
+/// A manual page.
+fn page(command: &clap::Command) -> Result<Vec<u8>, Failure> {
+    let mut text = Vec::new();
+    let source = concat!("pcadlang ", env!("CARGO_PKG_VERSION"));
+    let rendered = clap_mangen::Man::new(command.clone()).source(source).render(&mut text);
+    rendered.map_err(|e| plain(format!("the page of {} cannot be written: {e}", command.get_name())))?;
+    Ok(text)
+}
+
+/// Prints a text; whoever reads it may stop early.
+fn print(text: &[u8]) -> Result<(), Failure> {
+    match std::io::stdout().write_all(text) {
+        Err(e) if e.kind() != std::io::ErrorKind::BrokenPipe => Err(plain(format!("cannot write: {e}"))),
+        _ => Ok(()),
+    }
+}

@@ -1,0 +1,178 @@
+//! The text that is formatted, read token by token, and the comments between them.
+
+use super::columns::Seen;
+use crate::syntax::lexer::lex;
+use crate::syntax::span::FileId;
+use std::ops::Range;
+
+/// How a comment stands among the tokens.
+#[derive(Clone, Copy, Debug, PartialEq)]
+pub(super) enum Place {
+    /// Before a token of its line.
+    Inline,
+    /// Behind the last token of a line.
+    Trailing,
+    /// Under a trailing one, which it continues.
+    Below,
+    /// On lines of its own.
+    OwnLine,
+}
+
+/// A comment.
+#[derive(Clone, Copy, Debug)]
+pub(super) struct Comment<'s> {
+    /// With its delimiters.
+    pub text: &'s str,
+    pub place: Place,
+    /// Whether an empty line is before it.
+    pub blank: bool,
+    pub seen: Seen,
+}
+
+/// A text, its tokens, and which comes next.
+#[derive(Debug)]
+pub(super) struct Source<'s> {
+    text: &'s str,
+    tokens: Vec<Range<usize>>,
+    /// Where each line starts.
+    lines: Vec<usize>,
+    next: usize,
+    /// The comments before the next token that have not been taken.
+    comments: Vec<Comment<'s>>,
+    /// Whether an empty line is right before the next token.
+    blank: bool,
+}
+
+impl<'s> Source<'s> {
+    pub fn new(text: &'s str) -> Self {
+        let (lexemes, _) = lex(text, 0..text.len(), FileId(0), 0);
+        let tokens = lexemes.into_iter().map(|lexeme| lexeme.start..lexeme.end).collect();
+        let lines = std::iter::once(0).chain(text.match_indices('\n').map(|(i, _)| i + 1)).collect();
+        let mut source = Source { text, tokens, lines, next: 0, comments: Vec::new(), blank: false };
+        source.read_gap();
+        source
+    }
+
+    /// The next token.
+    pub fn peek(&self) -> &'s str {
+        self.tokens.get(self.next).map_or("", |token| &self.text[token.clone()])
+    }
+
+    /// How many tokens from the next one on are parentheses that open before a byte.
+    pub fn parentheses(&self, before: u32) -> usize {
+        let open = |token: &&Range<usize>| token.start < before as usize && &self.text[(*token).clone()] == "(";
+        self.tokens[self.next.min(self.tokens.len())..].iter().take_while(open).count()
+    }
+
+    /// Goes past the next token.
+    pub fn advance(&mut self) {
+        self.next += 1;
+        self.read_gap();
+    }
+
+    /// Takes the comments before the next token that satisfy a condition, up to the first that does not.
+    pub fn take(&mut self, wanted: impl Fn(Place) -> bool) -> Vec<Comment<'s>> {
+        let n = self.comments.iter().take_while(|comment| wanted(comment.place)).count();
+        self.comments.drain(..n).collect()
+    }
+
+    /// Whether there are comments before the next token that have not been taken.
+    pub fn has_comments(&self) -> bool {
+        !self.comments.is_empty()
+    }
+
+    /// Whether an empty line is right before what comes next.
+    pub fn blank(&self) -> bool {
+        self.comments.first().map_or(self.blank, |comment| comment.blank)
+    }
+
+    /// Whether the bracket that was just passed ends its line.
+    pub fn opened(&self) -> bool {
+        self.gap(self.next).trim_start_matches([' ', '\t']).starts_with('\n')
+    }
+
+    /// Whether the next token, a bracket, ends its line.
+    pub fn opens_lines(&self) -> bool {
+        self.tokens.get(self.next).is_some_and(|token| self.opened_at(token.start as u32))
+    }
+
+    /// Whether the bracket at a byte ends its line.
+    pub fn opened_at(&self, byte: u32) -> bool {
+        let behind = self.text.get(byte as usize + 1..).unwrap_or("");
+        behind.trim_start_matches([' ', '\t']).starts_with('\n')
+    }
+
+    /// Whether the next token starts a line.
+    pub fn starts_line(&self) -> bool {
+        self.gap(self.next).contains('\n')
+    }
+
+    /// Where the next token stands.
+    pub fn seen(&self) -> Seen {
+        self.place(self.tokens.get(self.next).map_or(self.text.len(), |token| token.start))
+    }
+
+    fn place(&self, byte: usize) -> Seen {
+        let line = self.lines.partition_point(|start| *start <= byte).saturating_sub(1);
+        let before = &self.text[self.lines.get(line).copied().unwrap_or(0)..byte];
+        let column = before.chars().count();
+        Seen { line, column, spaces: column - before.trim_end().chars().count() }
+    }
+
+    /// What is between the token before and a token.
+    fn gap(&self, token: usize) -> &'s str {
+        let start = token.checked_sub(1).and_then(|last| self.tokens.get(last)).map_or(0, |last| last.end);
+        let end = self.tokens.get(token).map_or(self.text.len(), |next| next.start);
+        self.text.get(start..end).unwrap_or("")
+    }
+
+    /// Reads the comments before the next token.
+    fn read_gap(&mut self) {
+        let (first, last) = (self.next == 0, self.next >= self.tokens.len());
+        let gap = self.gap(self.next);
+        let base = gap.as_ptr() as usize - self.text.as_ptr() as usize;
+        let mut comments: Vec<Comment<'s>> = Vec::new();
+        let mut at = 0;
+        // How many lines end before the next comment.
+        let mut ends = usize::from(first);
+        let mut own_line = Vec::new();
+        while let Some(rest) = gap.get(at..).filter(|rest| !rest.is_empty()) {
+            let length = if rest.starts_with("//") {
+                rest.find('\n').unwrap_or(rest.len())
+            } else if rest.starts_with("/*") {
+                rest.find("*/").map_or(rest.len(), |i| i + 2)
+            } else {
+                let c = rest.chars().next().unwrap_or(' ');
+                ends += usize::from(c == '\n');
+                at += c.len_utf8();
+                continue;
+            };
+            let seen = self.place(base + at);
+            own_line.push(ends);
+            let continues = comments.last().is_some_and(|above: &Comment<'_>| {
+                matches!(above.place, Place::Trailing | Place::Below)
+                    && (seen.line, seen.column) == (above.seen.line + 1, above.seen.column)
+                    && !above.text.contains('\n')
+            });
+            let place = match ends {
+                0 => Place::Trailing,
+                _ if continues => Place::Below,
+                _ => Place::OwnLine,
+            };
+            comments.push(Comment { text: rest[..length].trim_end(), place, blank: ends > 1, seen });
+            ends = 0;
+            at += length;
+        }
+        self.blank = ends > 1;
+        // Comments after which no line ends belong to the next token.
+        if ends == 0 && !last {
+            for (comment, ends) in comments.iter_mut().zip(own_line).rev() {
+                comment.place = Place::Inline;
+                if ends > 0 {
+                    break;
+                }
+            }
+        }
+        self.comments = comments;
+    }
+}
