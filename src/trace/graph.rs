@@ -5,6 +5,7 @@
 
 use super::choices::Choices;
 use super::journal::{Before, Entry};
+use super::limits::{Limits, Spent, raise};
 use super::node::*;
 use super::propose::{Constraint, Draws, Pending};
 
@@ -17,21 +18,6 @@ use crate::lang::value::Value;
 use crate::num::ExactSum;
 use rustc_hash::FxHashMap;
 use smallvec::SmallVec;
-
-/// Bounds on what a program may build.
-#[derive(Clone, Copy, Debug, PartialEq, Eq)]
-pub struct Limits {
-    /// Calls within calls.
-    pub depth: u32,
-    /// Nodes of the trace.
-    pub nodes: u32,
-}
-
-impl Default for Limits {
-    fn default() -> Self {
-        Limits { depth: 10_000, nodes: 200_000_000 }
-    }
-}
 
 /// The dependency graph of one execution.
 #[derive(Clone, Debug)]
@@ -97,6 +83,7 @@ pub(crate) struct Graph {
     /// False: every update re-runs everything.
     pub incremental: bool,
     pub limits: Limits,
+    pub spent: Spent,
     /// What was executed, when somebody watches.
     pub watched: Option<Vec<(u32, u32)>>,
 }
@@ -142,6 +129,7 @@ impl Graph {
             before: None,
             incremental: true,
             limits,
+            spent: Spent::default(),
             watched: None,
         };
         let root = Frame {
@@ -194,7 +182,7 @@ impl Graph {
                 frame.owner,
                 FaultKind::Limit,
                 format!("calls are nested more than {} deep", self.limits.depth),
-                Some("does the recursion have a base case that is reached?".into()),
+                Some(format!("does the recursion have a base case that is reached? If so, {}", raise("depth"))),
             ));
         }
         if self.nodes.len() + len > self.limits.nodes as usize {
@@ -203,9 +191,10 @@ impl Graph {
                 frame.owner,
                 FaultKind::Limit,
                 format!("the trace grew beyond {} nodes", self.limits.nodes),
-                Some("does the program loop or recurse without end?".into()),
+                Some(format!("does the program loop or recurse without end? If not, {}", raise("nodes"))),
             ));
         }
+        self.count_operation(code, frame.owner)?;
         let block = frame.block as usize;
         let id = self.place_frame(code, frame);
         self.note(Entry::FrameMade(id));

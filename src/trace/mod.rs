@@ -14,6 +14,7 @@ mod formula;
 mod gradient;
 mod graph;
 mod journal;
+mod limits;
 mod marginal;
 mod mark;
 mod node;
@@ -30,7 +31,7 @@ mod twin;
 
 pub use crate::lang::address::{Address, AddressSegment, AddressTextError};
 pub use choices::{Selection, Target};
-pub use graph::Limits;
+pub use limits::{Limits, Stop};
 pub use observed::{Observation, Replicate};
 pub use operations::{Given, Update};
 pub use propose::{Change, Constraint, Draws, Weight};
@@ -114,6 +115,11 @@ impl Trace {
         g.constraints.clear();
         g.revision = 0;
         Ok((trace, weight))
+    }
+
+    /// Bounds from now on.
+    pub fn set_limits(&mut self, limits: Limits) {
+        self.graph.limits = limits;
     }
 
     /// The program.
@@ -514,7 +520,7 @@ impl Trace {
     /// # Errors
     /// What the program does wrong.
     pub fn rerun(&self) -> TraceResult<Trace> {
-        Trace::generate(self.present_code(), self.constraints(), Draws::default(), self.graph.limits).map(|(t, _)| t)
+        Trace::generate(self.present_code(), self.constraints(), Draws::default(), self.graph.limits.clone()).map(|(t, _)| t)
     }
 
     /// Another execution of the same program under the same observations, with the values of some choices given.
@@ -526,7 +532,7 @@ impl Trace {
         constraints: impl IntoIterator<Item = (u64, Constraint)>,
         draws: Draws,
     ) -> TraceResult<Trace> {
-        let mut trace = Trace::generate(self.present_code(), constraints, draws, self.graph.limits)?.0;
+        let mut trace = Trace::generate(self.present_code(), constraints, draws, self.graph.limits.clone())?.0;
         trace.graph.incremental = self.graph.incremental;
         Ok(trace)
     }

@@ -13,7 +13,7 @@ use crate::infer::selection::{fail, selector};
 use crate::infer::sites::Sites;
 use crate::infer::state::StateError;
 use crate::lang::code::Code;
-use crate::lang::error::RunError;
+use crate::lang::error::{FaultKind, RunError};
 use crate::lang::value::Value;
 use crate::platform::clock::Instant;
 use crate::rng::{Purpose, StreamKey};
@@ -133,7 +133,14 @@ impl<'a> Runner<'a> {
     /// If the program fails, or the sink does.
     pub fn run(mut self, plan: &[KStmt]) -> Result<ChainResult, ChainError> {
         if !self.finished {
-            let flow = self.body(plan)?;
+            let flow = match self.body(plan) {
+                // A step that took too long is given up: draws and checkpoints from before it stay.
+                Err(ChainError::Run(e)) if e.kind == FaultKind::Stopped && self.draws > 0 => {
+                    self.way.clear();
+                    Flow::End
+                }
+                flow => flow?,
+            };
             if !self.way.is_empty() {
                 return Err(StateError::new("the checkpoint is of another plan").into());
             }

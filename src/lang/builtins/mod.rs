@@ -33,7 +33,7 @@ use row::{Arg, Row, arg, function, opt};
 pub use table::{Constant, Table};
 
 use super::error::Fault;
-use super::value::Value;
+use super::value::{MOST_ELEMENTS, MOST_NESTED, Value};
 use crate::dist::Dist;
 use smallvec::SmallVec;
 use std::borrow::Cow;
@@ -212,7 +212,14 @@ impl Builtin {
         let args = Args { builtin: self, values };
         match self.kind {
             Kind::Function(f) => f(&args),
-            Kind::Distribution(f) => f(&args).map(|d| Value::Dist(std::sync::Arc::new(d))),
+            Kind::Distribution(f) => {
+                let d = f(&args)?;
+                match d.parts(MOST_NESTED, MOST_ELEMENTS) {
+                    Some(n) if n <= MOST_ELEMENTS => Ok(Value::Dist(std::sync::Arc::new(d))),
+                    Some(_) => Err(args.too_large("parts", MOST_ELEMENTS)),
+                    None => Err(args.too_large("distributions within each other", MOST_NESTED as usize)),
+                }
+            }
             Kind::Form(_) | Kind::Inference => {
                 Err(Fault::type_error(format!("`{}` cannot be used as a function value", self.name)))
             }
