@@ -20,7 +20,7 @@ use crate::lang::code::Code;
 use crate::lang::error::{Fault, FaultKind, RunError};
 use crate::lang::load::{Loaded, Loader, beside, load, load_text, read, reason};
 use crate::lang::lower::{Compiled, Export, Inputs, Interface, Report, compile, inspect};
-use crate::lang::reach::{Outside, Reach, folder_of};
+use crate::lang::reach::{Outside, Reach, folder_of, read_file};
 use crate::lang::value::Value;
 use crate::platform::clock;
 use crate::render::Camera;
@@ -217,7 +217,7 @@ impl Program {
         let file = data::path_of(&kind, path);
         let folder = folder_of(Path::new(file));
         let reach = self.reach.clone().allow(folder).unwrap_or_else(|_| self.reach.clone());
-        let loaded = match std::fs::read(file) {
+        let loaded = match read_file(Path::new(file)) {
             Ok(bytes) => data::load(&kind, path, &bytes, &options, &|other| sibling(&reach, path, other)),
             Err(e) => Err(Fault::new(FaultKind::Other, format!("cannot read {file}: {}", reason(&e)))),
         };

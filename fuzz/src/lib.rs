@@ -6,6 +6,7 @@ use pcadlang::bank::Bank;
 use pcadlang::diag::{IntoDiagnostic, SourceMap, render};
 use pcadlang::geom::{FileFrame, UpAxis, gltf as gltf_file, obj as obj_file};
 use pcadlang::lang::builtins::data::{Options, load};
+use pcadlang::num::fnv1a;
 use pcadlang::render::Camera;
 use pcadlang::syntax::{parse, print, span::FileId};
 use pcadlang::trace::{Limits, SavedTrace, Trace};
@@ -14,6 +15,7 @@ use pcadlang::vision::keypoints::People;
 use pcadlang::vision::{Limits as Pixels, depth, mask, npy, photo};
 use pcadlang::{Model, Program, RunOptions};
 use std::sync::{Arc, OnceLock};
+use std::time::Duration;
 
 /// Pictures of a size that many can be tried of in a second.
 const PIXELS: Pixels = Pixels { max_side: 512, max_pixels: 1 << 16 };
@@ -46,14 +48,15 @@ pub fn program(bytes: &[u8]) {
         Ok(program) => program,
         Err(e) => return assert!(!e.to_string().is_empty()),
     };
-    match program.compile() {
+    match program.limits(small()).compile() {
         Ok(model) => run(&model),
         Err(e) => assert!(!e.to_string().is_empty()),
     }
 }
 
 fn run(model: &Model) {
-    let options = RunOptions { steps: Some(20), warmup: Some(10), limits: small(), ..RunOptions::default() };
+    let time = Some(Duration::from_millis(500));
+    let options = RunOptions { steps: Some(20), warmup: Some(10), time, limits: small(), ..RunOptions::default() };
     match model.run(&options, 1, 1) {
         Ok(posterior) => {
             let last = &posterior.chains[0].last;
@@ -66,7 +69,7 @@ fn run(model: &Model) {
 
 /// Limits under which a program takes a fraction of a second.
 fn small() -> Limits {
-    Limits { depth: 200, nodes: 20_000, ..Limits::default() }
+    Limits { depth: 200, nodes: 20_000, elements: 1_000_000, operations: 100_000, ..Limits::default() }
 }
 
 /// What a saved trace gives when loaded is saved as the same.
@@ -185,10 +188,17 @@ pub fn trace(bytes: &[u8]) {
     reload(traced(), &saved);
 }
 
-/// A bank: its header, every kind of entry, and a search.
+/// A bank: its header, every kind of entry, and a search. The hash of the header is put right, or nothing would get past it.
 pub fn bank(bytes: &[u8]) {
+    let mut bytes = bytes.to_vec();
+    let header = bytes.get(40..48).and_then(|w| w.try_into().ok()).map_or(usize::MAX, |w| u64::from_le_bytes(w) as usize);
+    if let Some(hash) = bytes.get(header..).map(fnv1a)
+        && let Some(place) = bytes.get_mut(48..56)
+    {
+        place.copy_from_slice(&hash.to_le_bytes());
+    }
     let path = std::env::temp_dir().join(format!("pcadlang-fuzz-{}.bank", std::process::id()));
-    if std::fs::write(&path, bytes).is_err() {
+    if std::fs::write(&path, &bytes).is_err() {
         return;
     }
     if let Ok(bank) = Bank::open(&path) {

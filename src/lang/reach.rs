@@ -3,7 +3,7 @@
 
 use super::load::Loader;
 use std::fmt;
-use std::io;
+use std::io::{self, Read};
 use std::path::{Path, PathBuf};
 
 /// The folders and files that a program may read; by default none.
@@ -93,7 +93,29 @@ impl Reach {
 
 impl Loader for Reach {
     fn read(&self, path: &str) -> io::Result<Vec<u8>> {
-        std::fs::read(self.resolve(Path::new(path))?)
+        let real = self.resolve(Path::new(path))?;
+        let found = real.metadata()?;
+        // A pipe would wait for ever.
+        if !found.is_file() && !found.is_dir() {
+            return Err(io::Error::other("it is no plain file"));
+        }
+        read_file(&real)
+    }
+}
+
+/// The most bytes of a file that is read whole.
+pub const MOST_BYTES: u64 = 1 << 29;
+
+/// The bytes of a file that is not too large.
+///
+/// # Errors
+/// As the file system has it, and if it has more than [`MOST_BYTES`].
+pub fn read_file(path: &Path) -> io::Result<Vec<u8>> {
+    let mut bytes = Vec::new();
+    std::fs::File::open(path)?.take(MOST_BYTES + 1).read_to_end(&mut bytes)?;
+    match bytes.len() as u64 > MOST_BYTES {
+        true => Err(io::Error::other(format!("it is too large; at most {MOST_BYTES} bytes are read"))),
+        false => Ok(bytes),
     }
 }
 

@@ -28,7 +28,7 @@ pub struct Limits {
 
 impl Default for Limits {
     fn default() -> Self {
-        Limits { depth: 10_000, nodes: 50_000_000, elements: 500_000_000, operations: u64::MAX, stop: Stop::default() }
+        Limits { depth: 10_000, nodes: 20_000_000, elements: 500_000_000, operations: u64::MAX, stop: Stop::default() }
     }
 }
 
