@@ -191,7 +191,8 @@ pub fn trace(bytes: &[u8]) {
 /// A bank: its header, every kind of entry, and a search. The hash of the header is put right, or nothing would get past it.
 pub fn bank(bytes: &[u8]) {
     let mut bytes = bytes.to_vec();
-    let header = bytes.get(40..48).and_then(|w| w.try_into().ok()).map_or(usize::MAX, |w| u64::from_le_bytes(w) as usize);
+    let header =
+        bytes.get(40..48).and_then(|w| w.try_into().ok()).map_or(usize::MAX, |w| u64::from_le_bytes(w) as usize);
     if let Some(hash) = bytes.get(header..).map(fnv1a)
         && let Some(place) = bytes.get_mut(48..56)
     {

@@ -3,11 +3,11 @@
 //! Files come from a [`Loader`], as a rule a [`Reach`](super::reach::Reach); `std/…` and the shipped programs are embedded, so that they work in any folder. A file of
 //! the user's own wins over an embedded one of the same name.
 
+use super::reach::Outside;
 use crate::diag::{Diagnostic, IntoDiagnostic, SourceMap};
 use crate::syntax::ast::{ItemKind, Program};
 use crate::syntax::parse;
 use crate::syntax::span::{FileId, Span};
-use super::reach::Outside;
 use std::io;
 use std::path::Path;
 

@@ -92,7 +92,8 @@ impl Stop {
 
     /// Whether it has been asked for, or time is up.
     pub fn is_asked(&self) -> bool {
-        self.asked.as_ref().is_some_and(|a| a.load(Ordering::Relaxed)) || self.until.is_some_and(|t| Instant::now() >= t)
+        self.asked.as_ref().is_some_and(|a| a.load(Ordering::Relaxed))
+            || self.until.is_some_and(|t| Instant::now() >= t)
     }
 }
 

@@ -520,7 +520,8 @@ impl Trace {
     /// # Errors
     /// What the program does wrong.
     pub fn rerun(&self) -> TraceResult<Trace> {
-        Trace::generate(self.present_code(), self.constraints(), Draws::default(), self.graph.limits.clone()).map(|(t, _)| t)
+        Trace::generate(self.present_code(), self.constraints(), Draws::default(), self.graph.limits.clone())
+            .map(|(t, _)| t)
     }
 
     /// Another execution of the same program under the same observations, with the values of some choices given.

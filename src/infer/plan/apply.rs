@@ -94,7 +94,8 @@ impl Runner<'_> {
         arm: Option<usize>,
     ) -> Result<Flow, ChainError> {
         if self.path.len() >= MOST_NESTED {
-            let message = format!("statements and kernels of a plan are within each other more than {MOST_NESTED} deep");
+            let message =
+                format!("statements and kernels of a plan are within each other more than {MOST_NESTED} deep");
             return Err(fail(e.span, message).into());
         }
         self.note(Doing::Kernel { arm, steps: 0, done: Outcome::default() });

@@ -50,11 +50,7 @@ impl CovarianceValue {
         Some(Self::joined(&x.0, &y.0, |x, y| x + y))
     }
 
-    fn joined(
-        x: &Covariance,
-        y: &Covariance,
-        join: fn(Covariance, Covariance) -> Covariance,
-    ) -> Result<Value, String> {
+    fn joined(x: &Covariance, y: &Covariance, join: fn(Covariance, Covariance) -> Covariance) -> Result<Value, String> {
         if x.param_count() + y.param_count() > MOST_PARAMS {
             return Err(format!("a covariance of more than {MOST_PARAMS} parameters"));
         }
