@@ -117,9 +117,9 @@ fn bodies() -> Vec<Vec<u8>> {
 }
 
 const CAMERAS: [&str; 2] = [
-    r#"{"model": "pinhole", "looks_along": [0, 0, -1], "up": [0, 1, 0], "position": [0, 0, 8], "image_width": 256,
-        "image_height": 256, "focal_px": 465.4, "principal_point": [128, 128]}"#,
-    r#"{"model": "orthographic", "looks_along": [0, 1, -1], "up": [0, 0, 1], "width": 64, "height": 48, "image": [64, 48],
+    r#"{"model": "pinhole", "looks_along": [0, 0, -1], "up": [0, 1, 0], "position": [0, 0, 8], "image": [256, 256],
+        "focal_px": 465.4, "principal_point": [128, 128]}"#,
+    r#"{"model": "orthographic", "looks_along": [0, 1, -1], "up": [0, 0, 1], "image": [64, 48],
         "units_per_pixel": 0.02}"#,
 ];
 
@@ -132,13 +132,25 @@ const RIG: &str = r#"{"mesh": "a.obj", "joints": [{"name": "a", "head": [0, 0, 0
 
 const MORPHS: &str = r#"{"morphs": {"m": {"vertices": [[0,0,0],[0,0,1],[0,0,0]], "heads": [[0,0,0],[0,0,0]], "tails": [[0,0,0],[0,0,0]]}}}"#;
 
-const KEYPOINTS: [&str; 4] = [
-    r#"[{"image_id": 1, "category_id": 1, "id": 7, "keypoints": [10, 20, 0.9, 1, 2, 0.5], "score": 0.5}]"#,
-    r#"{"images": [{"id": 1, "file_name": "000001.jpg", "width": 64, "height": 48}], "annotations": [{"image_id": 1, "id": 7,
-        "category_id": 1, "keypoints": [10, 20, 2]}], "categories": [{"id": 1, "keypoints": ["nose"]}]}"#,
-    r#"{"landmarks": [{"x": 0.1, "y": 0.2, "z": 0, "visibility": 0.9}]}"#,
-    r#"{"keypoints": {"head": {"x": 1, "y": 2, "confidence": 0.5}, "hand": [3, 4]}, "width": 64, "height": 48}"#,
+const PEOPLE: [&str; 3] = [
+    r#"{"keypoints": {"nose": [1, 2, 0.5], "hand": [3, 4]}, "width": 64, "height": 48}"#,
+    r#"{"seven": {"keypoints": {"nose": [10, 20, 0.9], "left_wrist": null}}, "eight": {"keypoints": {"nose": [1, 2]}}}"#,
+    "{\"nose\": [1, 2, 0.5], \"hand\": null}",
 ];
+
+/// People in every layout.
+fn people() -> Vec<Vec<u8>> {
+    let landmarks = [r#"{"x": 0.1, "y": 0.2, "z": 0, "visibility": 0.9}"#; 33].join(", ");
+    let coco = ["10, 20, 0.9"; 17].join(", ");
+    let one = format!("{{\"image_id\": 1, \"category_id\": 1, \"id\": 7, \"keypoints\": [{coco}], \"score\": 0.5}}");
+    let images = r#"[{"id": 1, "file_name": "000001.jpg", "width": 64, "height": 48}]"#;
+    let made = [
+        format!("[{one}]"),
+        format!("{{\"images\": {images}, \"annotations\": [{one}, {one}]}}"),
+        format!("{{\"pose_landmarks\": [{landmarks}]}}"),
+    ];
+    PEOPLE.iter().map(|t| t.as_bytes().to_vec()).chain(made.map(String::into_bytes)).collect()
+}
 
 /// What a target starts from.
 fn seeds_of(target: &str) -> Vec<Vec<u8>> {
@@ -174,7 +186,7 @@ fn seeds_of(target: &str) -> Vec<Vec<u8>> {
             (0..5).map(|i| serde_json::to_vec(&model.simulate(i, 0).unwrap().save(model.hash())).unwrap()).collect()
         }
         "bank" => vec![a_bank()],
-        "keypoints" => texts(&KEYPOINTS),
+        "keypoints" => people(),
         "table" => texts(&[
             "\0{\"a\": [1, 2, {\"b\": null}], \"c\": \"x\"}",
             "\u{1}x,y\n1,2.5\n-3e2, \"4\"\"\"\n",

@@ -159,8 +159,8 @@ fn export(
         Some(solid) => {
             let Some(mesh) = mesh(&solid) else { return Ok(()) };
             let bytes = if name.ends_with(".glb") { glb::write(&mesh) } else { obj::write(&mesh).into_bytes() };
-            write(dir, &name.replace('/', "_"), &bytes)
+            write(dir, &name.replace(['/', '\\'], "_"), &bytes)
         }
-        None => write(dir, &name.replace('/', "_"), value.to_string().as_bytes()),
+        None => write(dir, &name.replace(['/', '\\'], "_"), value.to_string().as_bytes()),
     }
 }

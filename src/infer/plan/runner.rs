@@ -14,7 +14,7 @@ use crate::infer::sites::Sites;
 use crate::infer::state::StateError;
 use crate::lang::code::Code;
 use crate::lang::error::{FaultKind, RunError};
-use crate::lang::value::Value;
+use crate::lang::value::{Extent, Value};
 use crate::platform::clock::Instant;
 use crate::rng::{Purpose, StreamKey};
 use crate::syntax::ast::{Expr, KStmt, KStmtKind};
@@ -193,7 +193,11 @@ impl<'a> Runner<'a> {
     }
 
     pub fn value(&mut self, e: &Expr) -> Result<Value, Box<RunError>> {
-        evaluate(e, &mut self.env())
+        let v = evaluate(e, &mut self.env())?;
+        match v.extent() {
+            Extent::Fits => Ok(v),
+            _ => Err(fail(e.span, "this value has too many elements, or is nested too deep".into())),
+        }
     }
 
     pub fn count(&mut self, e: &Expr) -> Result<u64, Box<RunError>> {
