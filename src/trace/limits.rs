@@ -7,9 +7,10 @@ use super::node::NodeId;
 use crate::lang::code::Code;
 use crate::lang::error::FaultKind;
 use crate::lang::value::{Extent, MOST_ELEMENTS, MOST_NESTED, Value};
+use crate::platform::clock::Instant;
 use std::sync::Arc;
 use std::sync::atomic::{AtomicBool, Ordering};
-use std::time::{Duration, Instant};
+use std::time::Duration;
 
 /// Bounds on what a program may build.
 #[derive(Clone, Debug)]
@@ -63,7 +64,8 @@ pub(super) fn raise(name: &str) -> String {
 #[derive(Clone, Debug, Default)]
 pub struct Stop {
     asked: Option<Arc<AtomicBool>>,
-    until: Option<Instant>,
+    /// Since when it has how much time.
+    time: Option<(Instant, Duration)>,
     patience: Duration,
 }
 
@@ -75,13 +77,13 @@ const BETWEEN_LOOKS: u32 = 1 << 12;
 impl Stop {
     /// Two seconds after this is set.
     pub fn when(asked: Arc<AtomicBool>) -> Stop {
-        Stop { asked: Some(asked), until: None, patience: PATIENCE }
+        Stop { asked: Some(asked), time: None, patience: PATIENCE }
     }
 
-    /// Also after a time.
+    /// Also when so much time has gone by from now on.
     #[must_use]
-    pub fn or_at(self, until: Option<Instant>) -> Stop {
-        Stop { until, ..self }
+    pub fn or_within(self, time: Option<Duration>) -> Stop {
+        Stop { time: time.map(|t| (Instant::now(), t)), ..self }
     }
 
     /// With another time than two seconds in which an update may end by itself.
@@ -93,7 +95,7 @@ impl Stop {
     /// Whether it has been asked for, or time is up.
     pub fn is_asked(&self) -> bool {
         self.asked.as_ref().is_some_and(|a| a.load(Ordering::Relaxed))
-            || self.until.is_some_and(|t| Instant::now() >= t)
+            || self.time.is_some_and(|(from, t)| from.elapsed() >= t)
     }
 }
 

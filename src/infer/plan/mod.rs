@@ -170,7 +170,7 @@ pub(crate) fn run_chain(
     chain: u32,
 ) -> Result<ChainResult, ChainError> {
     let started = Instant::now();
-    let options = &stoppable(options, progress, started);
+    let options = &stoppable(options, progress);
     if let Some(checkpoint) = sink.resume().map_err(ChainError::Sink)? {
         banks::check(plan, options)?;
         return Runner::resume(code, plan, options, progress, sink, chain, checkpoint)?.run(plan);
@@ -199,7 +199,7 @@ pub fn run_from(
     mut trace: Trace,
 ) -> Result<ChainResult, ChainError> {
     let started = Instant::now();
-    let options = &stoppable(options, progress, started);
+    let options = &stoppable(options, progress);
     banks::check(plan, options)?;
     trace.rollback();
     trace.set_limits(options.limits.clone());
@@ -207,9 +207,8 @@ pub fn run_from(
 }
 
 /// The options of a chain that is heard in the middle of an evaluation when it should end.
-fn stoppable(options: &RunOptions, progress: &Progress, started: Instant) -> RunOptions {
-    let until = options.time.and_then(|t| started.checked_add(t));
-    let stop = Stop::when(Arc::clone(&progress.cancelled)).or_at(until);
+fn stoppable(options: &RunOptions, progress: &Progress) -> RunOptions {
+    let stop = Stop::when(Arc::clone(&progress.cancelled)).or_within(options.time);
     RunOptions { limits: Limits { stop, ..options.limits.clone() }, ..options.clone() }
 }
 
