@@ -20,8 +20,9 @@ use crate::lang::builtins::scene::{CameraValue, DepthValue, ImageValue, Keypoint
 use crate::lang::builtins::{Table, data};
 use crate::lang::code::{Code, Eager};
 use crate::lang::error::{Fault, FaultKind, RunError};
-use crate::lang::load::{Disk, Loaded, Loader, Nowhere, load, load_text, read, reason};
+use crate::lang::load::{Loaded, Loader, beside, load, load_text, read, reason};
 use crate::lang::lower::{Compiled, Export, Inputs, Interface, Report, compile, inspect};
+use crate::lang::reach::{Outside, Reach, folder_of, read_file};
 use crate::lang::value::Value;
 use crate::platform::clock;
 use crate::render::Camera;
@@ -34,6 +35,7 @@ use indexmap::IndexMap;
 use rustc_hash::FxHashMap;
 use std::cell::RefCell;
 use std::fmt;
+use std::path::Path;
 use std::sync::{Arc, Mutex, PoisonError};
 
 /// What is wrong with a program, its data, or a run of it: messages with their places.
@@ -91,7 +93,8 @@ type Files = Arc<Mutex<FxHashMap<(String, String, String), (Value, String)>>>;
 pub struct Program {
     loaded: Loaded,
     sources: SourceMap,
-    loader: Arc<dyn Loader + Send + Sync>,
+    reach: Reach,
+    limits: Limits,
     name: String,
     text: String,
     sets: Vec<(String, String)>,
@@ -104,24 +107,38 @@ pub struct Program {
 }
 
 impl Program {
-    /// Loads a program by path; the shipped programs are found in any folder.
+    /// Loads a program by path; the shipped programs are found in any folder. It, and the files that it names, may be read below
+    /// its own folder and nowhere else.
     ///
     /// # Errors
-    /// If a file is missing, or does not parse.
+    /// If a file is missing or may not be read, or does not parse.
     pub fn open(path: &str) -> Result<Program, Error> {
+        Program::open_allowing::<&str>(path, &[])
+    }
+
+    /// As [`Program::open`], and may read below these folders, too.
+    ///
+    /// # Errors
+    /// As [`Program::open`], and if one of them is no folder.
+    pub fn open_allowing<P: AsRef<Path>>(path: &str, folders: &[P]) -> Result<Program, Error> {
         let mut sources = SourceMap::new();
-        match load(path, &Disk, &mut sources) {
-            Ok(loaded) => Ok(Program::new(path, loaded, sources, Arc::new(Disk))),
+        // A program that is not there has no folder; loading says so.
+        let mut reach = Reach::of_program(path).unwrap_or_default();
+        for folder in folders {
+            reach = widened(reach, folder.as_ref(), &sources)?;
+        }
+        match load(path, &reach, &mut sources) {
+            Ok(loaded) => Ok(Program::new(path, loaded, sources, reach)),
             Err(diagnostics) => Err(Error { diagnostics, sources }),
         }
     }
 
-    /// A program from its text; it can include only what is built in.
+    /// A program from its text; it can include only what is built in, and reads no files.
     ///
     /// # Errors
     /// If it does not parse.
     pub fn parse(text: &str) -> Result<Program, Error> {
-        Program::read("<program>", text, Arc::new(Nowhere))
+        Program::read("<program>", text, Reach::default())
     }
 
     /// A program from its text, which stands for a file of this name: what it includes and reads is found from there.
@@ -129,24 +146,25 @@ impl Program {
     /// # Errors
     /// As [`Program::open`].
     pub fn named(name: &str, text: &str) -> Result<Program, Error> {
-        Program::read(name, text, Arc::new(Disk))
+        Program::read(name, text, Reach::of_program(name).unwrap_or_default())
     }
 
-    fn read(name: &str, text: &str, loader: Arc<dyn Loader + Send + Sync>) -> Result<Program, Error> {
+    fn read(name: &str, text: &str, reach: Reach) -> Result<Program, Error> {
         let mut sources = SourceMap::new();
-        match load_text(name, text, &*loader, &mut sources) {
-            Ok(loaded) => Ok(Program::new(name, loaded, sources, loader)),
+        match load_text(name, text, &reach, &mut sources) {
+            Ok(loaded) => Ok(Program::new(name, loaded, sources, reach)),
             Err(diagnostics) => Err(Error { diagnostics, sources }),
         }
     }
 
-    fn new(name: &str, loaded: Loaded, sources: SourceMap, loader: Arc<dyn Loader + Send + Sync>) -> Program {
+    fn new(name: &str, loaded: Loaded, sources: SourceMap, reach: Reach) -> Program {
         let text =
             loaded.units.first().and_then(|u| sources.get(u.file)).map_or(String::new(), |f| f.text().to_string());
         Program {
             loaded,
             sources,
-            loader,
+            reach,
+            limits: Limits::default(),
             name: name.to_owned(),
             text,
             sets: Vec::new(),
@@ -211,7 +229,25 @@ impl Program {
         self
     }
 
-    /// Reads a file for a `data` item as its declared kind, with the options of its default.
+    /// Lets its `data` items and kernels read files below a folder; what it includes was read when it was
+    /// [opened](Program::open_allowing).
+    ///
+    /// # Errors
+    /// If there is no such folder.
+    pub fn allow_read(mut self, folder: impl AsRef<Path>) -> Result<Program, Error> {
+        self.reach = widened(self.reach, folder.as_ref(), &self.sources)?;
+        Ok(self)
+    }
+
+    /// Bounds on what the program may build when it is not run but looked at: one draw, the plan. Runs have their own
+    /// ([`RunOptions::limits`]).
+    #[must_use]
+    pub fn limits(self, limits: Limits) -> Program {
+        Program { limits, ..self }
+    }
+
+    /// Reads a file for a `data` item as its declared kind, with the options of its default. What that file names is read below
+    /// its own folder and where the program may read.
     ///
     /// # Errors
     /// If the program has no such item, or the file cannot be read as that.
@@ -220,8 +256,10 @@ impl Program {
         let (kind, options) = item.map_or((None, Options::default()), |d| (d.ty, d.options));
         let kind = kind.unwrap_or_else(|| "image".into());
         let file = data::path_of(&kind, path);
-        let loaded = match std::fs::read(file) {
-            Ok(bytes) => data::load(&kind, path, &bytes, &options, &|other| sibling(&Disk, path, other)),
+        let folder = folder_of(Path::new(file));
+        let reach = self.reach.clone().allow(folder).unwrap_or_else(|_| self.reach.clone());
+        let loaded = match read_file(Path::new(file)) {
+            Ok(bytes) => data::load(&kind, path, &bytes, &options, &|other| sibling(&reach, path, other)),
             Err(e) => Err(Fault::new(FaultKind::Other, format!("cannot read {file}: {}", reason(&e)))),
         };
         match loaded {
@@ -299,10 +337,10 @@ impl Program {
     /// Everything that is wrong with it.
     pub fn compile(mut self) -> Result<Model, Error> {
         self.default_camera();
-        let (loader, files) = (&*self.loader, &*self.files);
+        let (reach, files) = (&self.reach, &*self.files);
         let data_hash = RefCell::new(String::new());
         let read_data = |kind: &str, path: &str, folder: &str, options: &Options| {
-            let beside = format!("{folder}{path}");
+            let beside = beside(folder, path);
             let key = (kind.to_owned(), beside.clone(), format!("{options:?}"));
             let mut files = files.lock().unwrap_or_else(PoisonError::into_inner);
             if let Some((value, hash)) = files.get(&key) {
@@ -310,9 +348,11 @@ impl Program {
                 return Ok(value.clone());
             }
             let file = data::path_of(kind, &beside);
-            let (bytes, _) = read(loader, file)
-                .map_err(|e| Fault::new(FaultKind::Other, format!("cannot read {file}: {}", reason(&e))))?;
-            let value = data::load(kind, &beside, &bytes, options, &|other| sibling(loader, &beside, other))?;
+            let (bytes, _) = read(reach, file).map_err(|e| {
+                let fault = Fault::new(FaultKind::Other, format!("cannot read {file}: {}", reason(&e)));
+                Outside::hint(&e).into_iter().fold(fault, Fault::with_hint)
+            })?;
+            let value = data::load(kind, &beside, &bytes, options, &|other| sibling(reach, &beside, other))?;
             let hash = bytes_hash(&bytes);
             data_hash.borrow_mut().push_str(&hash);
             files.insert(key, (value.clone(), hash));
@@ -330,8 +370,8 @@ impl Program {
         match compile(&self.loaded, inputs, &mut self.sources) {
             Ok(compiled) => {
                 let hash = hash_of(&self.loaded, &self.sources, &self.sets);
-                let data_hash = data_hash.into_inner();
-                Ok(Model { compiled, sources: self.sources, text: self.text, hash, data_hash })
+                let (reach, limits, data_hash) = (self.reach, self.limits, data_hash.into_inner());
+                Ok(Model { compiled, sources: self.sources, text: self.text, hash, data_hash, reach, limits })
             }
             Err(diagnostics) => Err(Error { diagnostics, sources: self.sources }),
         }
@@ -341,8 +381,19 @@ impl Program {
 /// The contents of a file named relative to another.
 fn sibling(loader: &dyn Loader, file: &str, other: &str) -> Result<Vec<u8>, String> {
     let folder = file.rfind(['/', '\\']).map_or("", |i| &file[..=i]);
-    let path = format!("{folder}{other}");
-    read(loader, &path).map(|(bytes, _)| bytes).map_err(|e| format!("cannot read {path}: {}", reason(&e)))
+    let path = beside(folder, other);
+    read(loader, &path).map(|(bytes, _)| bytes).map_err(|e| {
+        let hint = Outside::hint(&e).map_or(String::new(), |h| format!("; {h}"));
+        format!("cannot read {path}: {}{hint}", reason(&e))
+    })
+}
+
+/// What may be read, and below one more folder.
+fn widened(reach: Reach, folder: &Path, sources: &SourceMap) -> Result<Reach, Error> {
+    reach.allow(folder).map_err(|e| {
+        let message = format!("cannot read {}: {}", folder.display(), reason(&e));
+        plain_error(Fault::new(FaultKind::Other, message), sources)
+    })
 }
 
 /// A hash of all a program's text and settings: a saved trace belongs to it.
@@ -374,6 +425,8 @@ pub struct Model {
     text: String,
     hash: String,
     data_hash: String,
+    reach: Reach,
+    limits: Limits,
 }
 
 impl Model {
@@ -405,6 +458,16 @@ impl Model {
         &self.text
     }
 
+    /// What it may read while it runs.
+    pub fn reach(&self) -> &Reach {
+        &self.reach
+    }
+
+    /// Bounds on what it may build when it is not run but looked at.
+    pub fn limits(&self) -> &Limits {
+        &self.limits
+    }
+
     /// The texts that errors point into.
     pub fn sources(&self) -> &SourceMap {
         &self.sources
@@ -428,7 +491,7 @@ impl Model {
     /// What the program does wrong.
     pub fn simulate(&self, seed: u64, index: u64) -> Result<Trace, Error> {
         let draws = Draws { key: StreamKey::new(seed, 0, Purpose::START), step: index, lane: 0 };
-        Trace::simulate(Arc::clone(self.code()), draws, Limits::default()).map_err(|e| self.run_error(*e))
+        Trace::simulate(Arc::clone(self.code()), draws, self.limits.clone()).map_err(|e| self.run_error(*e))
     }
 
     /// Turns a failure while running into messages.

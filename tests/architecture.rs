@@ -41,7 +41,7 @@ fn modules_depend_one_way() {
         ("render", &["render", "geom", "num", "platform"]),
         ("vision", &["vision", "num", "platform", "rng"]),
         ("lang", &["lang", "syntax", "diag", "dist", "geom", "render", "vision", "num", "rng"]),
-        ("trace", &["trace", "lang", "syntax", "diag", "dist", "num", "rng"]),
+        ("trace", &["trace", "lang", "syntax", "diag", "dist", "num", "platform", "rng"]),
         ("infer", &["infer", "trace", "lang", "syntax", "diag", "dist", "num", "platform", "rng"]),
         ("host", &["host", "infer", "lang", "syntax", "diag", "dist", "render", "rng", "Error"]),
         ("report", &["report", "infer", "num"]),

@@ -3,7 +3,8 @@
 use pcadlang::Program;
 use pcadlang::session::{Reply, Session, Trouble};
 use pcadlang::trace::Stop;
-use std::sync::atomic::AtomicBool;
+use std::sync::Arc;
+use std::sync::atomic::{AtomicBool, Ordering};
 use std::time::Duration;
 
 const LINE: &str = "let x = [0, 1, 2, 3];
@@ -16,7 +17,7 @@ predict next ~ normal(slope * 4 + intercept, noise);
 ";
 
 fn session(text: &str) -> Session {
-    Session::open(Program::named("<session>", text).unwrap(), 1, None).unwrap_or_else(|e| panic!("{e}")).0
+    Session::open(Program::named("<session>", text).unwrap(), 1, Stop::default()).unwrap_or_else(|e| panic!("{e}")).0
 }
 
 fn line() -> Session {
@@ -118,7 +119,7 @@ fn looking_changes_nothing() {
 /// What is assumed is drawn at once, although nothing is observed, and stays while the program grows.
 #[test]
 fn a_program_grows_and_its_choices_stay() {
-    let mut s = Session::new(7, None).unwrap();
+    let mut s = Session::new(7, Stop::default()).unwrap();
     let a = says(&mut s, "assume a ~ normal(0, 1)");
     assert!(a.starts_with("a = ") && a.contains("log joint"), "{a}");
     let value = says(&mut s, "a");
@@ -296,20 +297,20 @@ fn plans_of_all_kinds_run() {
 
 #[test]
 fn what_is_stopped_has_done_nothing() {
-    static FLAG: AtomicBool = AtomicBool::new(false);
-    let stop = Stop::new(&FLAG);
-    let open = Session::open(Program::named("<session>", LINE).unwrap(), 1, Some(stop));
+    let stop = Arc::new(AtomicBool::new(false));
+    let open = Session::open(Program::named("<session>", LINE).unwrap(), 1, Stop::when(Arc::clone(&stop)));
     let mut s = open.unwrap_or_else(|e| panic!("{e}")).0;
     let before = state(&s);
     let interrupted = |s: &mut Session, text: &str| {
-        stop.set(false);
+        stop.store(false, Ordering::SeqCst);
+        let later = Arc::clone(&stop);
         let ends = std::thread::spawn(move || {
             std::thread::sleep(Duration::from_millis(150));
-            stop.set(true);
+            later.store(true, Ordering::SeqCst);
         });
         let done = s.enter(text);
         ends.join().unwrap();
-        stop.set(false);
+        stop.store(false, Ordering::SeqCst);
         assert!(matches!(done, Err(Trouble::Stopped)), "{text}: {done:?}");
     };
     interrupted(&mut s, ":infer mh(one(@**)) 1000000000");
@@ -326,7 +327,7 @@ fn what_is_stopped_has_done_nothing() {
 /// Values without bounds on paper are a line on the screen, and what cannot be built is an error.
 #[test]
 fn huge_values_are_no_trouble() {
-    let mut s = Session::new(1, None).unwrap();
+    let mut s = Session::new(1, Stop::default()).unwrap();
     says(&mut s, "let big = 0 .. 3000000");
     assert!(says(&mut s, "big").contains("3000000 in all"));
     says(&mut s, "let a = [\"x\", 1]");
@@ -371,7 +372,7 @@ fn params_are_set_in_the_text() {
 #[test]
 fn a_program_without_its_data_is_its_prior() {
     let program = Program::named("p", "data ys: csv; assume a ~ normal(0, 1); observe normal(a, 1) = ys.y;").unwrap();
-    let (mut s, said) = Session::open(program, 1, None).unwrap();
+    let (mut s, said) = Session::open(program, 1, Stop::default()).unwrap();
     assert!(said.text.contains("`ys` is not given"), "{}", said.text);
     assert!(says(&mut s, ":trace").contains("@a"));
 }
@@ -425,7 +426,7 @@ fn sessions_are_saved_and_loaded() {
     let saved = state(&s);
     let said = says(&mut s, &format!(":save {}", at("cup")));
     assert!(said.contains("cup.pcad") && said.contains("cup.trace.json"), "{said}");
-    let mut other = Session::new(5, None).unwrap();
+    let mut other = Session::new(5, Stop::default()).unwrap();
     let said = says(&mut other, &format!(":load {}", at("cup.pcad")));
     assert!(said.contains("with the trace of"), "{said}");
     assert_eq!(state(&other), saved);
@@ -452,7 +453,7 @@ fn files_are_read_once() {
     std::fs::create_dir_all(&folder).unwrap();
     let path = folder.join("d.csv");
     std::fs::write(&path, "y\n1\n2\n").unwrap();
-    let mut s = Session::new(1, None).unwrap();
+    let mut s = Session::new(1, Stop::default()).unwrap();
     says(&mut s, &format!("data d = csv(\"{}\")", path.display()));
     std::fs::remove_dir_all(&folder).unwrap();
     says(&mut s, "observe normal(0, 1) = d.y");
@@ -473,7 +474,7 @@ fn scenes_are_seen() {
     assert_eq!(named.file.as_deref(), Some(std::path::Path::new("out.png")));
     assert!(refuses(&mut s, ":render a").contains("a number"));
     assert!(refuses(&mut s, ":render bal").contains("did you mean `ball`?"));
-    assert!(refuses(&mut Session::new(1, None).unwrap(), ":render").contains("no view"));
+    assert!(refuses(&mut Session::new(1, Stop::default()).unwrap(), ":render").contains("no view"));
 }
 
 /// Names that are asked for by nobody but the session are kept up to date as observations are.
@@ -490,7 +491,7 @@ fn shipped_programs_are_at_home() {
         "human_kth.pcad",
     ] {
         let program = Program::open(name).unwrap_or_else(|e| panic!("{e}"));
-        let mut s = Session::open(program, 1, None).unwrap_or_else(|e| panic!("{name}: {e}")).0;
+        let mut s = Session::open(program, 1, Stop::default()).unwrap_or_else(|e| panic!("{name}: {e}")).0;
         let addresses: Vec<String> = s.trace().choices().iter().map(|(a, ..)| a.to_string()).collect();
         assert!(!addresses.is_empty(), "{name} has no choices");
         for (i, a) in addresses.iter().cycle().step_by(7).take(12).enumerate() {

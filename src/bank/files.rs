@@ -4,16 +4,19 @@ use super::{Bank, BankError, Observed};
 use crate::Model;
 use crate::infer::{Banks, Neighbours};
 use crate::lang::load::reason;
+use crate::lang::reach::{Outside, Reach};
 use std::collections::BTreeMap;
 use std::path::{Path, PathBuf};
 use std::sync::{Arc, Mutex, PoisonError};
 
 type Found = Result<Arc<Neighbours>, String>;
 
-/// Answers the kernels of a run from bank files: a path is looked for as it is, then beside the program.
+/// Answers the kernels of a run from bank files: a path is looked for as it is, then beside the program,
+/// where the program may read.
 #[derive(Debug)]
 pub struct BankFiles {
     program: String,
+    reach: Reach,
     folder: PathBuf,
     observed: Observed,
     detector: Option<String>,
@@ -26,6 +29,7 @@ impl BankFiles {
     pub fn new(model: &Model, folder: &Path, detector: Option<String>) -> BankFiles {
         BankFiles {
             program: model.hash().to_owned(),
+            reach: model.reach().clone(),
             folder: folder.to_owned(),
             observed: Observed::of(model),
             detector,
@@ -34,9 +38,8 @@ impl BankFiles {
     }
 
     fn search(&self, path: &str, k: usize) -> Result<Neighbours, BankError> {
-        let beside = self.folder.join(path);
-        let as_given = Path::new(path);
-        let bank = Bank::open(if as_given.exists() || !beside.exists() { as_given } else { &beside })?;
+        let as_given = self.reach.resolve(Path::new(path));
+        let bank = Bank::open(&as_given.or_else(|_| self.reach.resolve(&self.folder.join(path)))?)?;
         bank.check(&self.program)?;
         bank.neighbours(&self.observed.query(&bank.header().features, self.detector.as_deref())?, k)
     }
@@ -47,7 +50,10 @@ impl Banks for BankFiles {
         let mut found = self.found.lock().unwrap_or_else(PoisonError::into_inner);
         let search = || match self.search(bank, k) {
             Ok(n) => Ok(Arc::new(n)),
-            Err(BankError::Io(e)) => Err(format!("the bank {bank} cannot be read: {}", reason(&e))),
+            Err(BankError::Io(e)) => {
+                let hint = Outside::hint(&e).map_or(String::new(), |h| format!("; {h}"));
+                Err(format!("the bank {bank} cannot be read: {}{hint}", reason(&e)))
+            }
             Err(e) => Err(format!("the bank {bank} cannot be used: {e}")),
         };
         found.entry((bank.to_owned(), k)).or_insert_with(search).clone()

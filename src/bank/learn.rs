@@ -8,7 +8,7 @@ use crate::lang::code::Operand;
 use crate::lang::value::Value;
 use crate::render::{Cores, View};
 use crate::rng::{Purpose, StreamKey};
-use crate::trace::{Draws, Limits, Trace};
+use crate::trace::{Draws, Trace};
 use std::path::Path;
 use std::sync::Arc;
 use std::sync::atomic::{AtomicU64, Ordering};
@@ -39,7 +39,7 @@ pub struct Learn<'a> {
 /// # Errors
 /// If the program fails or has no picture, a detector fails, or the file cannot be written.
 pub fn learn(model: &Model, how: &Learn, path: &Path, done: &AtomicU64) -> Result<(), BankError> {
-    let prior = Trace::prior(Arc::clone(model.code()), Limits::default());
+    let prior = Trace::prior(Arc::clone(model.code()), model.limits().clone());
     let operand = picture(&mut prior.clone(), draws(how.seed, 0, 0)).ok_or_else(|| {
         BankError::Observed("the program has no picture: no top-level name is a view or a solid".into())
     })?;

@@ -54,6 +54,20 @@ pub struct Given {
     /// The camera, as a JSON file; without one the default view (4.4 units across at distance 8)
     #[arg(long, value_name = "FILE")]
     pub camera: Option<PathBuf>,
+    /// What it may read and build
+    #[command(flatten)]
+    pub allowed: Allowed,
+}
+
+/// What a program may read and build.
+#[derive(Args, Clone, Debug, Default)]
+pub struct Allowed {
+    /// A folder below which the program may read files, besides its own folder; may be repeated
+    #[arg(long, value_name = "DIR")]
+    pub allow_read: Vec<PathBuf>,
+    /// Another limit on what the program builds: depth, nodes, elements or operations; may be repeated
+    #[arg(long = "limit", value_name = "NAME=N", value_parser = limit)]
+    pub limits: Vec<(String, u64)>,
 }
 
 /// How a program is sampled.
@@ -270,6 +284,9 @@ pub struct Check {
     /// A file for a `data` item: simulated data take its form
     #[arg(long, value_name = "[NAME=]FILE")]
     pub observe: Vec<String>,
+    /// What the programs may read and build
+    #[command(flatten)]
+    pub allowed: Allowed,
 }
 
 /// What the two checks are.
@@ -367,6 +384,9 @@ pub struct Repl {
     /// What a pose detector found: a file for the only `data` item of keypoints
     #[arg(long, value_name = "FILE[#ID]", requires = "program")]
     pub keypoints: Option<String>,
+    /// What the program may read and build
+    #[command(flatten)]
+    pub allowed: Allowed,
     /// The seed: the same lines with the same seed give the same session
     #[arg(long, default_value_t = 1)]
     pub seed: u64,
@@ -405,6 +425,13 @@ fn pair(text: &str) -> Result<(String, String), String> {
         Some((name, value)) if !name.trim().is_empty() => Ok((name.trim().to_owned(), value.trim().to_owned())),
         _ => Err("expected NAME=VALUE".into()),
     }
+}
+
+fn limit(text: &str) -> Result<(String, u64), String> {
+    let (name, number) = pair(text)?;
+    let number = number.parse().map_err(|_| format!("expected a whole number, got {number}"))?;
+    pcadlang::trace::Limits::default().with(&name, number)?;
+    Ok((name, number))
 }
 
 fn duration(text: &str) -> Result<Duration, String> {

@@ -13,7 +13,7 @@ use pcadlang::render::View;
 use pcadlang::report::pictures::{self, png};
 use pcadlang::report::{RunDir, npy};
 use pcadlang::session::{exported, exported_operand, over, strokes};
-use pcadlang::trace::{Limits, Trace};
+use pcadlang::trace::Trace;
 use pcadlang::vision::Photo;
 use std::sync::Arc;
 
@@ -41,7 +41,7 @@ pub fn best_draw(
     let best = chains.iter().filter_map(|c| c.best.as_ref()).max_by(|x, y| x.0.total_cmp(&y.0));
     let Some((_, choices)) = best else { return Ok(Shown::default()) };
     let draws = scene::predictive(seed, 0);
-    let built = Trace::generate(Arc::clone(model.code()), choices.iter().cloned(), draws, Limits::default());
+    let built = Trace::generate(Arc::clone(model.code()), choices.iter().cloned(), draws, model.limits().clone());
     let (mut trace, _) = built.map_err(|e| Failure::from(model.run_error(*e)))?;
     let saved = serde_json::to_vec(&trace.save(model.hash())).unwrap_or_default();
     write(dir, "best.trace.json", &saved)?;

@@ -52,7 +52,7 @@ pub fn calibrate(a: &Check) -> Result<(), Failure> {
 fn job(a: &Check, path: &str) -> Job {
     Job {
         features_from: None,
-        given: Given { program: path.to_owned(), sets: a.sets.clone(), camera: None },
+        given: Given { program: path.to_owned(), sets: a.sets.clone(), camera: None, allowed: a.allowed.clone() },
         observe: a.observe.clone(),
         observe_contours: None,
         keypoints: None,
@@ -85,6 +85,7 @@ fn run<T>(
         seed: a.seed,
         threads: a.threads.map_or_else(machine_threads, |n| n as usize),
         steps: a.steps,
+        limits: model.limits().clone(),
         ..Settings::default()
     };
     let (progress, done) = (Arc::new(Progress::default()), AtomicBool::new(false));

@@ -9,7 +9,7 @@ use pcadlang::diag::render;
 pub fn check(a: &Check) -> Result<(), Failure> {
     let mut failed = Vec::new();
     for path in &a.programs {
-        let program = match Program::open(path) {
+        let program = match Program::open_allowing(path, &a.allowed.allow_read) {
             Ok(p) => p,
             Err(e) => {
                 eprint!("{}", render(&e.sources, &e.diagnostics, has_colors()));

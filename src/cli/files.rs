@@ -2,11 +2,12 @@
 
 use super::{Failure, plain};
 use pcadlang::lang::load::reason;
+use pcadlang::lang::reach::read_file;
 use std::path::Path;
 
 /// The bytes of a file.
 pub fn read(path: &Path) -> Result<Vec<u8>, Failure> {
-    std::fs::read(path).map_err(|e| plain(format!("cannot read {}: {}", path.display(), reason(&e))))
+    read_file(path).map_err(|e| plain(format!("cannot read {}: {}", path.display(), reason(&e))))
 }
 
 /// Writes a file.

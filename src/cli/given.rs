@@ -8,17 +8,20 @@ use pcadlang::lang::builtins::data;
 use pcadlang::lang::builtins::scene::ImageValue;
 use pcadlang::lang::value::Value;
 use pcadlang::render::Camera;
+use pcadlang::trace::Limits as Bounds;
 use pcadlang::vision::{ContourMap, Limits, Photo, photo};
 use std::path::Path;
 
 /// Opens the program, with its parameters and camera.
 pub fn program(given: &Given, quiet: bool) -> Result<Program, Failure> {
-    let mut program = Program::open(&given.program)?;
+    let mut program = Program::open_allowing(&given.program, &given.allowed.allow_read)?;
     if !quiet {
         for path in program.embedded().iter().filter(|p| p.ends_with(".pcad") && !p.starts_with("std/")) {
             eprintln!("note: using the shipped {path}");
         }
     }
+    let limits = given.allowed.limits.iter().try_fold(Bounds::default(), |l, (name, n)| l.with(name, *n));
+    program = program.limits(limits.map_err(plain)?);
     for (name, value) in &given.sets {
         program = program.set(name, value);
     }

@@ -255,6 +255,7 @@ fn fill(
         // What is left of the time after compiling.
         time: s.time.map(|t| t.saturating_sub(begun.elapsed())),
         incremental: !s.no_incremental,
+        limits: model.limits().clone(),
         watch: Some(Arc::new(joints.clone())),
         banks: Some(Arc::new(BankFiles::new(model, folder(&job.given.program), job.features_from.clone()))),
         sites: true,

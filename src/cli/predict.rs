@@ -8,7 +8,6 @@ use pcadlang::infer::draws::{Discard, Sink};
 use pcadlang::infer::predictive::{Predictive, Replication, STATISTICS, observed, prior, statistics, tail};
 use pcadlang::infer::{Progress, diagnostics};
 use pcadlang::report::{RunDir, number, seconds, table};
-use pcadlang::trace::Limits;
 use pcadlang::{Model, RunOptions};
 use std::fmt::Write;
 use std::path::Path;
@@ -56,7 +55,7 @@ pub fn predict(a: &Predict) -> Result<(), Failure> {
 }
 
 fn from_prior(a: &Predict, model: &Model) -> Result<Vec<Replication>, Failure> {
-    let drawn = prior(model.code(), a.job.sampling.seed, a.n, job::threads(&a.job), Limits::default());
+    let drawn = prior(model.code(), a.job.sampling.seed, a.n, job::threads(&a.job), model.limits().clone());
     drawn.map_err(|e| model.chain_error(e).into())
 }
 

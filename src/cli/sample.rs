@@ -6,7 +6,7 @@ use pcadlang::lang::value::Value;
 use pcadlang::report::pictures::{contact_sheet, png, shaded};
 use pcadlang::report::{number, table};
 use pcadlang::session::drawn;
-use pcadlang::trace::{Limits, Trace};
+use pcadlang::trace::Trace;
 use std::sync::Arc;
 
 /// Draws scenes from the prior; a program without a scene gets a table of its values.
@@ -16,7 +16,7 @@ pub fn sample(a: &Sample) -> Result<(), Failure> {
     let mut rows = Vec::new();
     for i in 0..a.n {
         let draws = scene::predictive(a.seed, u64::from(i));
-        let mut trace = Trace::prior(Arc::clone(model.code()), Limits::default());
+        let mut trace = Trace::prior(Arc::clone(model.code()), model.limits().clone());
         let view = scene::view(&mut trace, draws, None);
         match view {
             Some(view) => pictures.push(shaded(&drawn(&view.frame(a.size)))),

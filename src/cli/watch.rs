@@ -4,9 +4,11 @@ use super::args::Check;
 use super::job::Interrupt;
 use super::{Failure, check, term};
 use pcadlang::diag::SourceMap;
-use pcadlang::lang::load::{Disk, Loader, load};
+use pcadlang::lang::load::{Loader, load};
+use pcadlang::lang::reach::Reach;
 use std::collections::BTreeMap;
 use std::io::{self, IsTerminal};
+use std::path::PathBuf;
 use std::sync::{Mutex, PoisonError};
 use std::time::{Duration, SystemTime};
 
@@ -17,7 +19,7 @@ const EVERY: Duration = Duration::from_millis(200);
 pub fn watch(a: &Check) -> Result<(), Failure> {
     let interrupt = Interrupt::listen();
     loop {
-        let seen = Seen::of(&a.programs);
+        let seen = Seen::of(&a.programs, &a.allowed.allow_read);
         clear();
         if let Err(failure) = check::check(a) {
             term::fail(failure);
@@ -55,13 +57,17 @@ type Stamp = Option<(SystemTime, u64)>;
 struct Seen(BTreeMap<String, Stamp>);
 
 impl Seen {
-    fn of(programs: &[String]) -> Seen {
+    fn of(programs: &[String], folders: &[PathBuf]) -> Seen {
         // What the text was read before is seen: a change that comes while it is checked counts.
-        let asked = Asked::default();
+        let mut seen = BTreeMap::new();
         for program in programs {
+            let own = Reach::of_program(program).unwrap_or_default();
+            let reach = folders.iter().fold(own, |reach, f| reach.clone().allow(f).unwrap_or(reach));
+            let asked = Asked { reach, seen: Mutex::new(seen) };
             let _ = load(program, &asked, &mut SourceMap::new());
+            seen = asked.seen.into_inner().unwrap_or_else(PoisonError::into_inner);
         }
-        Seen(asked.0.into_inner().unwrap_or_else(PoisonError::into_inner))
+        Seen(seen)
     }
 
     /// The files that are not as they were.
@@ -70,15 +76,17 @@ impl Seen {
     }
 }
 
-/// Reads from the file system and remembers what it was asked for.
-#[derive(Default)]
-struct Asked(Mutex<BTreeMap<String, Stamp>>);
+/// Reads what a program may read, and remembers what it was asked for.
+struct Asked {
+    reach: Reach,
+    seen: Mutex<BTreeMap<String, Stamp>>,
+}
 
 impl Loader for Asked {
     fn read(&self, path: &str) -> io::Result<Vec<u8>> {
-        let mut asked = self.0.lock().unwrap_or_else(PoisonError::into_inner);
-        asked.entry(path.to_owned()).or_insert_with(|| stamp(path));
-        Disk.read(path)
+        let mut seen = self.seen.lock().unwrap_or_else(PoisonError::into_inner);
+        seen.entry(path.to_owned()).or_insert_with(|| stamp(path));
+        self.reach.read(path)
     }
 }
 
@@ -99,14 +107,14 @@ mod tests {
         let (main, part, missing) = (path("main.pcad"), path("part.pcad"), path("missing.pcad"));
         std::fs::write(&main, "include \"part.pcad\"; include \"missing.pcad\"; let a = 1;").unwrap();
         std::fs::write(&part, "let b = ;").unwrap();
-        let seen = Seen::of(std::slice::from_ref(&main));
+        let seen = Seen::of(std::slice::from_ref(&main), &[]);
         assert!(seen.changed().is_empty(), "{:?}", seen.changed());
         // A file that is included, though nothing parses, and one that is not there yet.
         std::fs::write(&part, "let b = 10;").unwrap();
         assert_eq!(seen.changed(), [part.as_str()]);
         std::fs::write(&missing, "").unwrap();
         assert_eq!(seen.changed(), [missing.as_str(), part.as_str()]);
-        let seen = Seen::of(&[main]);
+        let seen = Seen::of(&[main], &[]);
         assert!(seen.changed().is_empty(), "{:?}", seen.changed());
         std::fs::remove_file(&part).unwrap();
         assert_eq!(seen.changed(), [part.as_str()]);

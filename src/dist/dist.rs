@@ -173,6 +173,33 @@ impl Dist {
         }
     }
 
+    /// How many distributions it is made of, counted as often as they occur; `None` if they are within each other deeper than so
+    /// many. May stop counting above `most`.
+    pub fn parts(&self, depth: u32, most: usize) -> Option<usize> {
+        let inside = |parts: &[Dist]| {
+            let mut sum = 0usize;
+            for p in parts.iter().filter(|p| p.is_compound()) {
+                sum = sum.saturating_add(p.parts(depth.checked_sub(1)?, most)?);
+                if sum > most {
+                    break;
+                }
+            }
+            Some(sum.saturating_add(parts.len()))
+        };
+        match self {
+            Dist::Iid(d) => Some(inside(std::slice::from_ref(d.one()))?.saturating_mul(d.len())),
+            Dist::Ordered(d) => Some(inside(std::slice::from_ref(d.one()))?.saturating_mul(d.len())),
+            Dist::Product(d) => inside(d.parts()),
+            Dist::Mixture(d) => inside(d.components()),
+            _ => Some(1),
+        }
+    }
+
+    /// Whether it is made of others.
+    fn is_compound(&self) -> bool {
+        matches!(self, Dist::Iid(_) | Dist::Ordered(_) | Dist::Product(_) | Dist::Mixture(_))
+    }
+
     /// The log density of element `i`; -inf if there is none.
     #[inline]
     pub fn element_log_density(&self, i: usize, x: &Datum) -> f64 {

@@ -5,6 +5,9 @@ use super::gaussian::{Gaussian, gaussian_family};
 use super::param::finite;
 use super::{Covariance, ParamError};
 
+/// The most points: the time to factor their covariance grows as the cube of their number.
+const MOST_POINTS: usize = 4000;
+
 /// What is added to the diagonal of the covariance matrix, as a share of the variance: part of the model.
 const JITTER: f64 = 1e-6;
 
@@ -22,6 +25,10 @@ impl Gp {
         if mean.len() != at.len() {
             let value = format!("{} for {}", mean.len(), at.len());
             return Err(ParamError::new("gp", "mean", value, "must have a number for each point"));
+        }
+        if at.len() > MOST_POINTS {
+            let rule = "must have at most 4000 points";
+            return Err(ParamError::new("gp", "at", at.len(), rule));
         }
         for m in &mean {
             finite("gp", "mean", *m)?;

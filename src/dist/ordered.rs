@@ -26,6 +26,21 @@ impl Ordered {
         Ok(Ordered { one, n })
     }
 
+    /// How many numbers there are.
+    pub fn len(&self) -> usize {
+        self.n
+    }
+
+    /// Whether there are none.
+    pub fn is_empty(&self) -> bool {
+        self.n == 0
+    }
+
+    /// The distribution of each before they are put in order.
+    pub fn one(&self) -> &Dist {
+        &self.one
+    }
+
     fn parts(&self) -> impl Iterator<Item = &Dist> {
         std::iter::repeat_n(&self.one, self.n)
     }

@@ -47,7 +47,12 @@ type Lazy<T> = LazyLock<Arc<[T]>, Box<dyn FnOnce() -> Arc<[T]> + Send>>;
 pub struct Solid {
     instances: Arc<Lazy<Instance>>,
     landmarks: Arc<Lazy<Landmark>>,
+    /// How many lists within each other wait for somebody to look.
+    waiting: u32,
 }
+
+/// The most that wait: each is a call within a call when somebody looks.
+const MOST_WAITING: u32 = 64;
 
 impl fmt::Debug for Solid {
     fn fmt(&self, f: &mut fmt::Formatter<'_>) -> fmt::Result {
@@ -100,7 +105,7 @@ impl Solid {
 
     /// Placed meshes, without named points.
     pub fn of(instances: Arc<[Instance]>) -> Solid {
-        Solid { instances: ready(instances), landmarks: ready(Arc::default()) }
+        Solid { instances: ready(instances), landmarks: ready(Arc::default()), waiting: 0 }
     }
 
     /// The same with these named points in place of its own (world coordinates); a name that occurs again gets `#2`, `#3`, …
@@ -129,7 +134,7 @@ impl Solid {
     where
         M: IntoIterator<Item = Instance>,
     {
-        Solid { instances: later(move || make().into_iter().collect()), landmarks: ready(Arc::default()) }
+        Solid { instances: later(move || make().into_iter().collect()), landmarks: ready(Arc::default()), waiting: 1 }
     }
 
     /// Its meshes.
@@ -143,7 +148,26 @@ impl Solid {
         let placed = move || of.iter().map(|i| Instance { affine: by * i.affine, ..i.clone() }).collect();
         let of = Arc::clone(&self.landmarks);
         let moved = move || of.iter().map(|l| Landmark { position: by.point(l.position), ..l.clone() }).collect();
-        Solid { instances: later(placed), landmarks: later(moved) }
+        Solid { instances: later(placed), landmarks: later(moved), waiting: self.waiting + 1 }.looked_at_in_time()
+    }
+
+    /// The same, made at once where too much waits.
+    fn looked_at_in_time(mut self) -> Solid {
+        if self.waiting >= MOST_WAITING {
+            LazyLock::force(&self.instances);
+            LazyLock::force(&self.landmarks);
+            self.waiting = 0;
+        }
+        self
+    }
+
+    /// About how many numbers there are in meshes that it alone has.
+    pub fn own_numbers(&self) -> usize {
+        if self.waiting > 0 {
+            return 0;
+        }
+        let own = self.instances.iter().filter(|i| Arc::strong_count(&i.mesh) == 1);
+        own.map(|i| 3 * i.mesh.positions.len() + 5 * i.mesh.topology.triangles.len()).sum()
     }
 
     /// Several together; part numbers follow one another, and so do landmarks.
@@ -158,7 +182,8 @@ impl Solid {
         }
         let of: Vec<_> = solids.iter().map(|s| Arc::clone(&s.landmarks)).collect();
         let landmarks = later(move || unique(of.iter().flat_map(|landmarks| landmarks.iter().cloned())));
-        Solid { landmarks, ..Solid::of(instances.into()) }
+        let waiting = solids.iter().map(|s| s.waiting).max().unwrap_or(0) + 1;
+        Solid { landmarks, waiting, ..Solid::of(instances.into()) }.looked_at_in_time()
     }
 
     /// The number of parts.

@@ -123,7 +123,7 @@ fn builtin(name: &str, values: &[&Value], e: &Expr, env: &Scope) -> Result<Value
                 error.hint = f.hint;
                 error
             }),
-            Kind::Distribution(f) => match f(&Args { builtin: b, values }) {
+            Kind::Distribution(_) => match b.distribution(values) {
                 Ok(d) => Ok(Value::Dist(Arc::new(d))),
                 Err(f) => {
                     let mut error = fail(e.span, f.message);

@@ -89,8 +89,8 @@ pub fn starts(code: &Arc<Code>, seed: u64, chain: u32, how: Start, limits: Limit
     let mut best: Vec<Trace> = Vec::new();
     let mut found = 0;
     let mut last = None;
-    for attempt in 0..how.draws + RETRIES {
-        match Trace::simulate(Arc::clone(code), Draws { key, step: attempt, lane: 0 }, limits) {
+    for attempt in 0..how.draws.saturating_add(RETRIES) {
+        match Trace::simulate(Arc::clone(code), Draws { key, step: attempt, lane: 0 }, limits.clone()) {
             Ok(t) if t.log_joint() > f64::NEG_INFINITY => {
                 found += 1;
                 let place = best.partition_point(|b| b.log_joint() >= t.log_joint());
@@ -102,6 +102,9 @@ pub fn starts(code: &Arc<Code>, seed: u64, chain: u32, how: Start, limits: Limit
             Ok(t) => last = Some(Ok(t)),
             Err(e) if e.is_recoverable() => last = Some(Err(e)),
             Err(e) => return Err(StartError::Run(e)),
+        }
+        if found > 0 && limits.stop.is_asked() || found == 0 && attempt + 1 >= RETRIES {
+            break;
         }
         // Failures cost attempts too, once there is something to start from.
         if found >= how.draws || (found > 0 && attempt + 1 >= how.draws) {
@@ -135,7 +138,7 @@ pub(crate) fn start_of(code: &Arc<Code>, plan: &[KStmt], options: &RunOptions) -
     let Some((e, args)) = init else { return Ok(Start::default()) };
     let wrong = || ChainError::Run(fail(e.span, "init takes prior() or best_of(n)".into()));
     let [how] = args else { return Err(wrong()) };
-    let mut trace = Trace::prior(Arc::clone(code), options.limits);
+    let mut trace = Trace::prior(Arc::clone(code), options.limits.clone());
     let mut count = |e: &Expr| -> Result<u64, ChainError> {
         let (draws, started) = (Draws::default(), Instant::now());
         let mut env = Scope { code, trace: &mut trace, variables: &[], draws, started, steps: 0, moved: None };

@@ -125,7 +125,7 @@ pub fn prior(
     limits: Limits,
 ) -> Result<Vec<Replication>, ChainError> {
     let one = |i: u32| -> Result<Replication, ChainError> {
-        let trace = state(code, limits, seed, i)?;
+        let trace = state(code, limits.clone(), seed, i)?;
         Ok(replication(&trace, replicating(seed, i, 0))?)
     };
     in_parallel(threads.max(1), (0..count).collect(), one).into_iter().collect()

@@ -17,6 +17,8 @@ pub enum FaultKind {
     Index,
     /// A limit on recursion or size.
     Limit,
+    /// A stop that was asked for, or the end of the time.
+    Stopped,
     /// A value that needs itself.
     Cycle,
     /// Two draws at one address.

@@ -1,13 +1,15 @@
 //! Finding the files of a program: the main one and what it includes, each parsed once per `include`.
 //!
-//! Files come from a [`Loader`]; `std/…` and the shipped programs are embedded, so that they work in any folder. A file of
+//! Files come from a [`Loader`], as a rule a [`Reach`](super::reach::Reach); `std/…` and the shipped programs are embedded, so that they work in any folder. A file of
 //! the user's own wins over an embedded one of the same name.
 
+use super::reach::Outside;
 use crate::diag::{Diagnostic, IntoDiagnostic, SourceMap};
 use crate::syntax::ast::{ItemKind, Program};
 use crate::syntax::parse;
 use crate::syntax::span::{FileId, Span};
 use std::io;
+use std::path::Path;
 
 /// Where files come from.
 pub trait Loader: Send + Sync {
@@ -16,16 +18,6 @@ pub trait Loader: Send + Sync {
     /// # Errors
     /// As the file system has it.
     fn read(&self, path: &str) -> io::Result<Vec<u8>>;
-}
-
-/// Reads from the file system.
-#[derive(Clone, Copy, Debug, Default)]
-pub struct Disk;
-
-impl Loader for Disk {
-    fn read(&self, path: &str) -> io::Result<Vec<u8>> {
-        std::fs::read(path)
-    }
 }
 
 /// Knows only what is embedded.
@@ -161,6 +153,11 @@ pub fn reason(e: &io::Error) -> String {
     }
 }
 
+/// A path that a file in a folder names: relative to the folder, which is empty or ends in `/`.
+pub fn beside(folder: &str, path: &str) -> String {
+    if Path::new(path).is_absolute() { path.to_owned() } else { format!("{folder}{path}") }
+}
+
 /// A path without the `./` at its start: a file has one name here, so that a circle is seen.
 fn tidy(mut path: &str) -> &str {
     while let Some(rest) = path.strip_prefix("./") {
@@ -226,7 +223,7 @@ impl Loading<'_> {
 
     fn include(&mut self, folder: &str, path: &str, span: Span) -> Option<usize> {
         let path = tidy(path);
-        let beside = format!("{folder}{path}");
+        let beside = beside(folder, path);
         let found = read(self.loader, &beside).map(|f| (f, beside.clone()));
         let found = found.or_else(|e| read(self.loader, path).map(|f| (f, path.to_owned())).map_err(|_| e));
         let ((bytes, inside), path) = match found {
@@ -234,9 +231,10 @@ impl Loading<'_> {
             Err(e) => {
                 let d = Diagnostic::error(format!("cannot read {beside}"), span, reason(&e));
                 let near = crate::diag::nearest(path, EMBEDDED.iter().map(|(n, _)| *n));
-                self.errors.push(match near {
-                    Some(n) => d.hint(format!("did you mean \"{n}\"?")),
-                    None => d.hint("paths are relative to the file that includes; `std/…` is built in"),
+                self.errors.push(match (Outside::hint(&e), near) {
+                    (Some(hint), _) => d.hint(hint),
+                    (None, Some(n)) => d.hint(format!("did you mean \"{n}\"?")),
+                    (None, None) => d.hint("paths are relative to the file that includes; `std/…` is built in"),
                 });
                 return None;
             }

@@ -4,6 +4,7 @@
 //! language nor the traces know what a picture is.
 
 use super::adjoint::Adjoint;
+pub use super::extent::{Extent, MOST_ELEMENTS, MOST_NESTED};
 use crate::dist::{Datum, Dist};
 use crate::rng::Stream;
 use indexmap::IndexMap;
@@ -89,6 +90,10 @@ pub trait Object: Any + fmt::Debug + Send + Sync {
     /// One line for people, where the type has something to say of its contents.
     fn summary(&self) -> Option<String> {
         None
+    }
+    /// About how many numbers it holds that nothing else does, where they are many.
+    fn own_numbers(&self) -> usize {
+        0
     }
     /// Its contents as numbers, in an order and number that depend on its form alone; NaN where something is missing.
     fn numbers(&self) -> Option<Vec<f64>> {

@@ -3,7 +3,7 @@
 
 use super::{Error, Files, Model, Program};
 use crate::diag::IntoDiagnostic;
-use crate::lang::load::Disk;
+use crate::lang::reach::Reach;
 use crate::syntax::ast::{Item, ItemKind, KStmt, Stmt, StmtKind};
 use crate::syntax::span::FileId;
 use crate::syntax::{SyntaxError, parse, parse_expr};
@@ -15,7 +15,7 @@ impl Program {
     /// # Errors
     /// As [`Program::open`].
     pub fn edited(&self, text: &str) -> Result<Program, Error> {
-        let new = Program::read(&self.name, text, Arc::clone(&self.loader))?;
+        let new = Program::read(&self.name, text, self.reach.clone())?;
         let (loaded, sources, text) = (new.loaded, new.sources, new.text);
         Ok(Program { loaded, sources, text, ..self.clone() })
     }
@@ -73,7 +73,8 @@ impl Program {
     /// # Errors
     /// If it would not load from there.
     pub fn written_as(&self, path: &str) -> Result<Program, Error> {
-        Program { name: path.to_owned(), loader: Arc::new(Disk), ..self.clone() }.edited(&self.text)
+        let reach = Reach::of_program(path).unwrap_or_default();
+        Program { name: path.to_owned(), reach, ..self.clone() }.edited(&self.text)
     }
 
     /// Another program with what this one was given, as far as it asks for it.
@@ -83,13 +84,18 @@ impl Program {
     pub fn replaced(&self, path: &str) -> Result<Program, Error> {
         let new = Program::open(path)?;
         let interface = new.interface();
-        let mut new =
-            Program { loaded: new.loaded, sources: new.sources, name: new.name, text: new.text, ..self.clone() };
+        let mut new = Program {
+            loaded: new.loaded,
+            sources: new.sources,
+            name: new.name,
+            text: new.text,
+            reach: new.reach,
+            ..self.clone()
+        };
         new.sets.retain(|(name, _)| interface.params.iter().any(|p| p.name == *name));
         new.data.retain(|name, _| interface.data.iter().any(|d| d.name == *name));
         // Files may have changed.
         new.files = Files::default();
-        new.loader = Arc::new(Disk);
         Ok(new)
     }
 }

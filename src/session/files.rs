@@ -31,12 +31,12 @@ impl Session {
     pub(super) fn load(&mut self, name: &str) -> Result<Reply, Trouble> {
         let path = format!("{}.trace.json", bare(name));
         let program = self.program.replaced(&format!("{}.pcad", bare(name)))?;
-        let (loaded, note) = Session::open(program, self.seed, self.limits.stop)?;
+        let (loaded, note) = Session::open(program, self.seed, self.limits.stop.clone())?;
         let past = self.remember(&format!(":load {name}"));
         let (mut said, mut trace) = (note.text, loaded.trace);
         if let Some(saved) = saved_trace(Path::new(&path))? {
             let code = Arc::clone(loaded.model.code());
-            trace = Trace::load(code, loaded.model.hash(), &saved, self.limits).map_err(|e| {
+            trace = Trace::load(code, loaded.model.hash(), &saved, self.limits.clone()).map_err(|e| {
                 Trouble::plain(format!("{path}: {e}")).hint("without that file the program loads alone")
             })?;
             said += &format!("with the trace of {path}\n");

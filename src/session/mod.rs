@@ -34,6 +34,7 @@ use crate::trace::{Constraint, Draws, Limits, Stop, Trace};
 use run::{Background, Finished};
 use std::collections::VecDeque;
 use std::sync::Arc;
+use std::time::Duration;
 
 /// What a typed text is called in messages.
 const INPUT: &str = "<input>";
@@ -78,7 +79,7 @@ impl Session {
     ///
     /// # Errors
     /// None that is known.
-    pub fn new(seed: u64, stop: Option<Stop>) -> Result<Session, Trouble> {
+    pub fn new(seed: u64, stop: Stop) -> Result<Session, Trouble> {
         Session::open(Program::named(NAME, "")?, seed, stop).map(|(s, _)| s)
     }
 
@@ -87,8 +88,8 @@ impl Session {
     ///
     /// # Errors
     /// What is wrong with the program. Where only data are missing the session is one of its prior.
-    pub fn open(program: Program, seed: u64, stop: Option<Stop>) -> Result<(Session, Reply), Trouble> {
-        let limits = Limits { nodes: NODES, stop, ..Limits::default() };
+    pub fn open(program: Program, seed: u64, stop: Stop) -> Result<(Session, Reply), Trouble> {
+        let limits = Limits { nodes: NODES, stop: stop.after(Duration::ZERO), ..Limits::default() };
         let missing = program.missing_data();
         let (program, note) = match &missing[..] {
             [] => (program.eager(Eager::Names), None),
@@ -100,7 +101,7 @@ impl Session {
         };
         let program = Arc::new(program);
         let model = Arc::new((*program).clone().compile()?);
-        let trace = Trace::prior(Arc::clone(model.code()), limits);
+        let trace = Trace::prior(Arc::clone(model.code()), limits.clone());
         let mut session = Session {
             seed,
             limits,
@@ -151,7 +152,7 @@ impl Session {
             None => self.value_of(text).map(|v| Reply::text(shown::whole(&v) + "\n")),
         };
         match done {
-            Err(_) if self.limits.stop.is_some_and(Stop::is_set) => Err(Trouble::Stopped),
+            Err(_) if self.limits.stop.is_asked() => Err(Trouble::Stopped),
             done => done,
         }
     }
@@ -180,7 +181,7 @@ impl Session {
         {
             for lane in 0..ATTEMPTS {
                 let draws = Draws { key, step: self.clock, lane };
-                match Trace::generate(Arc::clone(&code), kept.iter().cloned(), draws, self.limits) {
+                match Trace::generate(Arc::clone(&code), kept.iter().cloned(), draws, self.limits.clone()) {
                     Ok((t, _)) if t.log_joint() > f64::NEG_INFINITY => return Ok((t, note.to_owned())),
                     Ok((t, _)) => {
                         let nothing_new = t.choice_count() <= kept.len();

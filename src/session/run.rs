@@ -144,30 +144,30 @@ impl Session {
             return Err(trouble.hint("`:wait` for it, `:stop` it, or `:drop` it first"));
         }
         let note = job.note.clone();
-        let stop = if in_background { None } else { self.limits.stop };
-        let run = self.begin(job, stop)?;
+        let stop = if in_background { Stop::default() } else { self.limits.stop.clone() };
+        let run = self.begin(job, stop.clone())?;
         if in_background {
             let text = format!("{note}run {} in the background: {}\n", run.number, run.what);
             self.background = Some(run);
             return Ok(Reply::text(text));
         }
-        self.wait_for(&run, stop, true)?;
+        self.wait_for(&run, &stop, true)?;
         let said = self.adopt(run)?;
         Ok(Reply::text(note + &said))
     }
 
     /// Starts a chain on a clone of the trace.
-    fn begin(&mut self, job: Job, stop: Option<Stop>) -> Result<Background, Trouble> {
+    fn begin(&mut self, job: Job, stop: Stop) -> Result<Background, Trouble> {
         let mut trace = match Arc::ptr_eq(&job.model, &self.model) {
             true => self.trace.clone(),
             false => self.moved_to(&job.model, &self.trace)?,
         };
-        trace.set_limits(Limits { stop, ..self.limits });
+        let limits = Limits { stop, ..self.limits.clone() };
+        trace.set_limits(limits.clone());
         self.chains += 1;
         let number = self.chains;
         let folder = Path::new(self.program.name()).parent().unwrap_or(Path::new("")).to_owned();
         let banks = BankFiles::new(&job.model, &folder, None);
-        let limits = Limits { stop, ..self.limits };
         let options = RunOptions {
             seed: self.seed,
             steps: job.steps,
@@ -197,10 +197,9 @@ impl Session {
     }
 
     /// Waits until a run is over, or until that is stopped from outside; `ends` says whether the run ends then.
-    fn wait_for(&mut self, run: &Background, stop: Option<Stop>, ends: bool) -> Result<(), Trouble> {
-        let is_stopped = || stop.is_some_and(Stop::is_set);
+    fn wait_for(&mut self, run: &Background, stop: &Stop, ends: bool) -> Result<(), Trouble> {
         while run.done.recv_timeout(PAUSE) == Err(RecvTimeoutError::Timeout) {
-            if is_stopped() {
+            if stop.is_asked() {
                 if !ends {
                     return Err(Trouble::Stopped);
                 }
@@ -210,7 +209,7 @@ impl Session {
                 watch(&run.status());
             }
         }
-        if ends && is_stopped() { Err(Trouble::Stopped) } else { Ok(()) }
+        if ends && stop.is_asked() { Err(Trouble::Stopped) } else { Ok(()) }
     }
 
     /// Makes the last state of a run that is over the session's.
@@ -236,7 +235,7 @@ impl Session {
         if !Arc::ptr_eq(&run.model, &self.model) {
             last = self.moved_to(&self.model, &last)?;
         }
-        last.set_limits(self.limits);
+        last.set_limits(self.limits.clone());
         let past = self.remember(&format!("inference by {}", finished.what));
         let before = std::mem::replace(&mut self.trace, last).log_joint();
         self.keep(past);
@@ -257,7 +256,7 @@ impl Session {
     /// `:wait`.
     pub(super) fn wait(&mut self) -> Result<Reply, Trouble> {
         let run = self.taken()?;
-        let waited = self.wait_for(&run, self.limits.stop, false);
+        let waited = self.wait_for(&run, &self.limits.stop.clone(), false);
         let said = run.line();
         self.background = Some(run);
         waited.map(|()| Reply::text(said))
@@ -267,7 +266,7 @@ impl Session {
     pub(super) fn stop(&mut self) -> Result<Reply, Trouble> {
         let run = self.taken()?;
         run.progress.cancelled.store(true, Ordering::Relaxed);
-        if let Err(e) = self.wait_for(&run, self.limits.stop, false) {
+        if let Err(e) = self.wait_for(&run, &self.limits.stop.clone(), false) {
             self.background = Some(run);
             return Err(e);
         }

@@ -157,7 +157,7 @@ impl Graph {
                     }
                 }
             }
-            match self.step(code, n) {
+            match self.count_operation(code, n).and_then(|()| self.step(code, n)) {
                 Ok(Step::Done) => {}
                 Ok(Step::Wait) => {}
                 Err(e) => {
@@ -191,6 +191,12 @@ impl Graph {
             node.changed = epoch;
         }
         self.settle_node(code, n)
+    }
+
+    /// Ends the evaluation of a node with a value that it made, which counts towards the limits.
+    pub fn finish_made(&mut self, code: &Code, n: NodeId, value: Value) -> Result<Step, Failure> {
+        self.count_elements(code, n, &value)?;
+        Ok(self.finish(code, n, value))
     }
 
     /// Ends the evaluation of a node whose value stays.

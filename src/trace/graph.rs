@@ -5,6 +5,7 @@
 
 use super::choices::Choices;
 use super::journal::{Before, Entry};
+use super::limits::{Limits, Spent, raise};
 use super::node::*;
 use super::propose::{Constraint, Draws, Pending};
 
@@ -17,53 +18,6 @@ use crate::lang::value::Value;
 use crate::num::ExactSum;
 use rustc_hash::FxHashMap;
 use smallvec::SmallVec;
-use std::sync::atomic::{AtomicBool, Ordering};
-
-/// Bounds on what a program may build.
-#[derive(Clone, Copy, Debug, PartialEq, Eq)]
-pub struct Limits {
-    /// Calls within calls.
-    pub depth: u32,
-    /// Nodes of the trace.
-    pub nodes: u32,
-    /// What ends an evaluation from outside.
-    pub stop: Option<Stop>,
-}
-
-impl Default for Limits {
-    fn default() -> Self {
-        Limits { depth: 10_000, nodes: 200_000_000, stop: None }
-    }
-}
-
-/// A flag that ends an evaluation, looked at where calls and passes of loops begin; the trace is then as it was before.
-#[derive(Clone, Copy, Debug)]
-pub struct Stop(&'static AtomicBool);
-
-impl Stop {
-    /// By a flag of the host.
-    pub const fn new(flag: &'static AtomicBool) -> Self {
-        Stop(flag)
-    }
-
-    /// Sets the flag, or takes it back.
-    pub fn set(self, on: bool) {
-        self.0.store(on, Ordering::SeqCst);
-    }
-
-    /// Whether it is set.
-    pub fn is_set(self) -> bool {
-        self.0.load(Ordering::Relaxed)
-    }
-}
-
-impl PartialEq for Stop {
-    fn eq(&self, other: &Self) -> bool {
-        std::ptr::eq(self.0, other.0)
-    }
-}
-
-impl Eq for Stop {}
 
 /// The dependency graph of one execution.
 #[derive(Clone, Debug)]
@@ -129,6 +83,7 @@ pub(crate) struct Graph {
     /// False: every update re-runs everything.
     pub incremental: bool,
     pub limits: Limits,
+    pub spent: Spent,
     /// What was executed, when somebody watches.
     pub watched: Option<Vec<(u32, u32)>>,
 }
@@ -174,6 +129,7 @@ impl Graph {
             before: None,
             incremental: true,
             limits,
+            spent: Spent::default(),
             watched: None,
         };
         let root = Frame {
@@ -226,7 +182,7 @@ impl Graph {
                 frame.owner,
                 FaultKind::Limit,
                 format!("calls are nested more than {} deep", self.limits.depth),
-                Some("does the recursion have a base case that is reached?".into()),
+                Some(format!("does the recursion have a base case that is reached? If so, {}", raise("depth"))),
             ));
         }
         if self.nodes.len() + len > self.limits.nodes as usize {
@@ -235,12 +191,10 @@ impl Graph {
                 frame.owner,
                 FaultKind::Limit,
                 format!("the trace grew beyond {} nodes", self.limits.nodes),
-                Some("does the program loop or recurse without end?".into()),
+                Some(format!("does the program loop or recurse without end? If not, {}", raise("nodes"))),
             ));
         }
-        if self.limits.stop.is_some_and(Stop::is_set) {
-            return Err(self.fail(code, frame.owner, FaultKind::Limit, "stopped".into(), None));
-        }
+        self.count_operation(code, frame.owner)?;
         let block = frame.block as usize;
         let id = self.place_frame(code, frame);
         self.note(Entry::FrameMade(id));

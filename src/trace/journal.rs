@@ -77,6 +77,7 @@ impl Graph {
                 1
             }
         };
+        self.spent.renew();
         self.drawn = ExactSum::default();
         self.undrawn = ExactSum::default();
         self.redrawn.clear();

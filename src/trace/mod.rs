@@ -15,6 +15,7 @@ mod formula;
 mod gradient;
 mod graph;
 mod journal;
+mod limits;
 mod marginal;
 mod mark;
 mod node;
@@ -32,7 +33,7 @@ mod twin;
 pub use crate::lang::address::{Address, AddressSegment, AddressTextError};
 pub use choices::{Selection, Target};
 pub use explain::{Effect, Reach, Reached, Term};
-pub use graph::{Limits, Stop};
+pub use limits::{Limits, Stop};
 pub use observed::{Observation, Replicate};
 pub use operations::{Given, Update};
 pub use propose::{Change, Constraint, Draws, Weight};
@@ -521,7 +522,8 @@ impl Trace {
     /// # Errors
     /// What the program does wrong.
     pub fn rerun(&self) -> TraceResult<Trace> {
-        Trace::generate(self.present_code(), self.constraints(), Draws::default(), self.graph.limits).map(|(t, _)| t)
+        Trace::generate(self.present_code(), self.constraints(), Draws::default(), self.graph.limits.clone())
+            .map(|(t, _)| t)
     }
 
     /// Another execution of the same program under the same observations, with the values of some choices given.
@@ -533,7 +535,7 @@ impl Trace {
         constraints: impl IntoIterator<Item = (u64, Constraint)>,
         draws: Draws,
     ) -> TraceResult<Trace> {
-        let mut trace = Trace::generate(self.present_code(), constraints, draws, self.graph.limits)?.0;
+        let mut trace = Trace::generate(self.present_code(), constraints, draws, self.graph.limits.clone())?.0;
         trace.graph.incremental = self.graph.incremental;
         Ok(trace)
     }

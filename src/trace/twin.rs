@@ -24,7 +24,7 @@ impl Trace {
             return Ok(None);
         }
         let code = Arc::new(self.present_code().with_surrogates(&ops));
-        let (mut twin, _) = Trace::generate(code, self.constraints(), Draws::default(), self.graph.limits)?;
+        let (mut twin, _) = Trace::generate(code, self.constraints(), Draws::default(), self.graph.limits.clone())?;
         twin.graph.observed = Arc::clone(&self.graph.observed);
         twin.graph.incremental = self.graph.incremental;
         Ok(Some(twin))

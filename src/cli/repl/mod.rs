@@ -18,6 +18,7 @@ use pcadlang::trace::Stop;
 use std::cell::{Cell, RefCell};
 use std::io::{BufRead, IsTerminal, Write};
 use std::rc::Rc;
+use std::sync::Arc;
 use std::sync::atomic::{AtomicBool, AtomicU32, Ordering};
 
 /// The prompt.
@@ -25,37 +26,33 @@ const PROMPT: &str = "pcad> ";
 /// Before the lines of a recording that go on.
 const CONTINUED: &str = "    > ";
 
-/// Set by Ctrl-C.
-static STOP: AtomicBool = AtomicBool::new(false);
-/// How often Ctrl-C was pressed since the last entry.
-static PRESSED: AtomicU32 = AtomicU32::new(0);
-
 /// Runs a session until its input ends.
 pub fn repl(a: &Repl) -> Result<(), Failure> {
-    let stop = Stop::new(&STOP);
-    let (session, said) = open(a, stop)?;
+    let interrupts = Arc::new(Interrupts::default());
+    let (session, said) = open(a, Stop::when(Arc::clone(&interrupts.asked)))?;
     let is_live = std::io::stdin().is_terminal() && std::io::stdout().is_terminal() && !a.transcript;
     // If no handler can be set, the system's own stays.
+    let heard = Arc::clone(&interrupts);
     let _ = ctrlc::set_handler(move || {
-        stop.set(true);
+        heard.asked.store(true, Ordering::SeqCst);
         // A single operation, such as an array of a billion numbers, cannot be ended.
-        if PRESSED.fetch_add(1, Ordering::SeqCst) >= 2 {
+        if heard.pressed.fetch_add(1, Ordering::SeqCst) >= 2 {
             std::process::exit(3);
         }
     });
     let shown = Rc::new(Cell::new(false));
-    let mut front = Front { session: Rc::new(RefCell::new(session)), graphics: graphics(a), shown, stop };
+    let mut front = Front { session: Rc::new(RefCell::new(session)), graphics: graphics(a), shown, interrupts };
     print(&said.text);
     if is_live { front.prompt() } else { front.script(a.transcript) }
 }
 
 fn open(a: &Repl, stop: Stop) -> Result<(Session, Reply), Failure> {
     let Some(path) = &a.program else {
-        return Session::new(a.seed, Some(stop)).map(|s| (s, Reply::default())).map_err(Failure::from);
+        return Session::new(a.seed, stop).map(|s| (s, Reply::default())).map_err(Failure::from);
     };
     let job = job(a, path);
     let (program, _) = given::observe(given::program(&job.given, false)?, &job)?;
-    Ok(Session::open(program, a.seed, Some(stop))?)
+    Ok(Session::open(program, a.seed, stop)?)
 }
 
 /// What the program is given, as `run` has it.
@@ -70,7 +67,12 @@ fn job(a: &Repl, path: &str) -> Job {
         no_incremental: false,
     };
     Job {
-        given: Given { program: path.to_owned(), sets: a.sets.clone(), camera: a.camera.clone() },
+        given: Given {
+            program: path.to_owned(),
+            sets: a.sets.clone(),
+            camera: a.camera.clone(),
+            allowed: a.allowed.clone(),
+        },
         observe: a.observe.clone(),
         observe_contours: None,
         keypoints: a.keypoints.clone(),
@@ -100,7 +102,15 @@ struct Front {
     graphics: Graphics,
     /// Whether there is a line of progress on the terminal.
     shown: Rc<Cell<bool>>,
-    stop: Stop,
+    interrupts: Arc<Interrupts>,
+}
+
+/// Ctrl-C, since the last entry.
+#[derive(Default)]
+struct Interrupts {
+    asked: Arc<AtomicBool>,
+    /// How often.
+    pressed: AtomicU32,
 }
 
 impl Front {
@@ -156,8 +166,8 @@ impl Front {
 
     /// Does an entry and shows what came of it; true if the user leaves.
     fn enter(&mut self, text: &str) -> Result<bool, Failure> {
-        self.stop.set(false);
-        PRESSED.store(0, Ordering::SeqCst);
+        self.interrupts.asked.store(false, Ordering::SeqCst);
+        self.interrupts.pressed.store(0, Ordering::SeqCst);
         let done = self.session.borrow_mut().enter(text);
         if self.shown.take() {
             eprint!("\r\x1b[K");

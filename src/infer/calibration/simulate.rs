@@ -33,7 +33,7 @@ pub(in crate::infer) fn replicating(seed: u64, index: u32, step: u64) -> Draws {
 
 /// Draws a state and data.
 pub(super) fn simulate(code: &Arc<Code>, settings: &Settings, index: u32) -> Result<Simulated, CalibrationError> {
-    let trace = state(code, settings.limits, settings.seed, index)?;
+    let trace = state(code, settings.limits.clone(), settings.seed, index)?;
     with_data(trace, settings, index)
 }
 
@@ -41,7 +41,7 @@ pub(super) fn simulate(code: &Arc<Code>, settings: &Settings, index: u32) -> Res
 /// reject such states, so they are drawn again here.
 pub(in crate::infer) fn state(code: &Arc<Code>, limits: Limits, seed: u64, index: u32) -> Result<Trace, ChainError> {
     let key = StreamKey::new(seed, index, Purpose::TRUTH);
-    let draw = |step| Trace::simulate(Arc::clone(code), Draws { key, step, lane: 0 }, limits);
+    let draw = |step| Trace::simulate(Arc::clone(code), Draws { key, step, lane: 0 }, limits.clone());
     attempts(RETRIES, draw).map_err(|e| match e.is_recoverable() {
         true => ChainError::Start(StartError::Run(e)),
         false => ChainError::Run(e),

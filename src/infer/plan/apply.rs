@@ -18,6 +18,9 @@ use std::sync::atomic::Ordering;
 /// The most kernels of a chain: arguments that change without end would fill the memory.
 const MOST: usize = 10_000;
 
+/// How deep statements and declared kernels may be within each other: a kernel may call itself.
+const MOST_NESTED: usize = 200;
+
 impl Runner<'_> {
     pub(super) fn mix(&mut self, arms: &[MixArm], doing: Doing) -> Result<Flow, ChainError> {
         if let Doing::Kernel { arm: Some(i), .. } = doing {
@@ -90,6 +93,11 @@ impl Runner<'_> {
         args: &[Arg],
         arm: Option<usize>,
     ) -> Result<Flow, ChainError> {
+        if self.path.len() >= MOST_NESTED {
+            let message =
+                format!("statements and kernels of a plan are within each other more than {MOST_NESTED} deep");
+            return Err(fail(e.span, message).into());
+        }
         self.note(Doing::Kernel { arm, steps: 0, done: Outcome::default() });
         if self.way.is_empty() {
             let given = arguments(k, args, e.span, &mut self.env())?;

@@ -156,7 +156,7 @@ impl<'a> Runner<'a> {
             return Err(StateError::new(message).into());
         }
         let count = c.state.len();
-        let (trace, _) = Trace::generate(Arc::clone(code), c.state, Draws::default(), options.limits)?;
+        let (trace, _) = Trace::generate(Arc::clone(code), c.state, Draws::default(), options.limits.clone())?;
         if trace.choice_count() != count {
             return Err(StateError::new("the checkpoint has other choices than the program").into());
         }

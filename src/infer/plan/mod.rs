@@ -18,7 +18,7 @@ use crate::lang::code::Code;
 use crate::lang::error::RunError;
 use crate::platform::clock::Instant;
 use crate::syntax::ast::{Expr, ExprKind, KStmt};
-use crate::trace::{Constraint, Draws, Limits, Trace};
+use crate::trace::{Constraint, Draws, Limits, Stop, Trace};
 use runner::Runner;
 use std::fmt;
 use std::sync::Arc;
@@ -100,8 +100,8 @@ pub trait Watch: fmt::Debug + Send + Sync {
 /// What is shared between the chains and whoever watches them.
 #[derive(Debug, Default)]
 pub struct Progress {
-    /// Set to end the run at the next step.
-    pub cancelled: AtomicBool,
+    /// Set to end the run at the next step, or after a while in the middle of one.
+    pub cancelled: Arc<AtomicBool>,
     /// Counted up to have every chain hand a [`Checkpoint`] to its sink at the next step. One that ends before its plan does hands
     /// one over in any case.
     pub checkpoints: AtomicU64,
@@ -170,13 +170,14 @@ pub(crate) fn run_chain(
     chain: u32,
 ) -> Result<ChainResult, ChainError> {
     let started = Instant::now();
+    let options = &stoppable(options, progress);
     if let Some(checkpoint) = sink.resume().map_err(ChainError::Sink)? {
         banks::check(plan, options)?;
         return Runner::resume(code, plan, options, progress, sink, chain, checkpoint)?.run(plan);
     }
     let how = start_of(code, plan, options)?;
     banks::check(plan, options)?;
-    let mut begun = starts(code, options.seed, chain, how, options.limits).map_err(ChainError::Start)?;
+    let mut begun = starts(code, options.seed, chain, how, options.limits.clone()).map_err(ChainError::Start)?;
     for trace in &mut begun {
         super::force::apply(code, trace, options, chain)?;
     }
@@ -198,9 +199,17 @@ pub fn run_from(
     mut trace: Trace,
 ) -> Result<ChainResult, ChainError> {
     let started = Instant::now();
+    let options = &stoppable(options, progress);
     banks::check(plan, options)?;
     trace.rollback();
+    trace.set_limits(options.limits.clone());
     run_among(code, plan, options, progress, sink, (chain, started), vec![trace])
+}
+
+/// The options of a chain that is heard in the middle of an evaluation when it should end.
+fn stoppable(options: &RunOptions, progress: &Progress) -> RunOptions {
+    let stop = Stop::when(Arc::clone(&progress.cancelled)).or_within(options.time);
+    RunOptions { limits: Limits { stop, ..options.limits.clone() }, ..options.clone() }
 }
 
 /// Runs a plan from the best of some states.

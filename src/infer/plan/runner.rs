@@ -13,8 +13,8 @@ use crate::infer::selection::{fail, selector};
 use crate::infer::sites::Sites;
 use crate::infer::state::StateError;
 use crate::lang::code::Code;
-use crate::lang::error::RunError;
-use crate::lang::value::Value;
+use crate::lang::error::{FaultKind, RunError};
+use crate::lang::value::{Extent, Value};
 use crate::platform::clock::Instant;
 use crate::rng::{Purpose, StreamKey};
 use crate::syntax::ast::{Expr, KStmt, KStmtKind};
@@ -133,7 +133,14 @@ impl<'a> Runner<'a> {
     /// If the program fails, or the sink does.
     pub fn run(mut self, plan: &[KStmt]) -> Result<ChainResult, ChainError> {
         if !self.finished {
-            let flow = self.body(plan)?;
+            let flow = match self.body(plan) {
+                // A step that took too long is given up: draws and checkpoints from before it stay.
+                Err(ChainError::Run(e)) if e.kind == FaultKind::Stopped && self.draws > 0 => {
+                    self.way.clear();
+                    Flow::End
+                }
+                flow => flow?,
+            };
             if !self.way.is_empty() {
                 return Err(StateError::new("the checkpoint is of another plan").into());
             }
@@ -186,7 +193,11 @@ impl<'a> Runner<'a> {
     }
 
     pub fn value(&mut self, e: &Expr) -> Result<Value, Box<RunError>> {
-        evaluate(e, &mut self.env())
+        let v = evaluate(e, &mut self.env())?;
+        match v.extent() {
+            Extent::Fits => Ok(v),
+            _ => Err(fail(e.span, "this value has too many elements, or is nested too deep".into())),
+        }
     }
 
     pub fn count(&mut self, e: &Expr) -> Result<u64, Box<RunError>> {

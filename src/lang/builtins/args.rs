@@ -3,12 +3,9 @@
 use super::Builtin;
 use super::elementwise::truth;
 use crate::lang::error::{Fault, FaultKind};
-use crate::lang::value::{Object, Record, Value};
+use crate::lang::value::{MOST_ELEMENTS, Object, Record, Value};
 use std::borrow::Cow;
 use std::sync::Arc;
-
-/// The most elements of an array that a function makes in one go.
-pub const MAX_ELEMENTS: usize = 10_000_000;
 
 /// The arguments of one call, in the table's order; `nothing` stands for those left out.
 pub struct Args<'a> {
@@ -169,14 +166,24 @@ impl<'a> Args<'a> {
     /// The number of elements of an array to be made.
     pub fn count(&self, i: usize) -> Result<usize, Fault> {
         let n = self.int_in(i, 0, i64::MAX)? as usize;
-        if n <= MAX_ELEMENTS { Ok(n) } else { Err(self.too_many(n as f64)) }
+        if n <= MOST_ELEMENTS { Ok(n) } else { Err(self.too_many(n as f64)) }
+    }
+
+    /// Checks the number of elements of what is to be made.
+    pub fn fits(&self, n: usize) -> Result<(), Fault> {
+        if n <= MOST_ELEMENTS { Ok(()) } else { Err(self.too_many(n as f64)) }
+    }
+
+    /// The error that a distribution has too much in it.
+    pub fn too_large(&self, what: &str, most: usize) -> Fault {
+        Fault::new(FaultKind::Limit, format!("{}: more than {most} {what}", self.builtin.full_name()))
     }
 
     /// The error that an array would be too long.
     #[doc(hidden)]
     pub fn too_many(&self, n: f64) -> Fault {
         let message = format!("{}: an array of {n} elements is too long", self.builtin.full_name());
-        Fault::new(FaultKind::Limit, message).with_hint(format!("at most {MAX_ELEMENTS} are made in one go"))
+        Fault::new(FaultKind::Limit, message).with_hint(format!("at most {MOST_ELEMENTS} are made in one go"))
     }
 
     /// A vector of exactly three numbers, or one number for all three, or a default.

@@ -9,6 +9,9 @@ use std::any::Any;
 
 const SECTION: &str = "Covariances";
 
+/// The most parameters of a covariance function.
+const MOST_PARAMS: usize = 200;
+
 /// A covariance function.
 #[derive(Clone, Debug)]
 pub struct CovarianceValue(pub Covariance);
@@ -24,7 +27,7 @@ impl Object for CovarianceValue {
 
     fn multiply(&self, other: &Value) -> Option<Result<Value, String>> {
         let other = other.downcast::<CovarianceValue>()?;
-        Some(Ok(Value::object(CovarianceValue(self.0.clone() * other.0.clone()))))
+        Some(Self::joined(&self.0, &other.0, |x, y| x * y))
     }
 
     fn pull_product(&self, other: &Value, by: &Adjoint) -> Option<[Adjoint; 2]> {
@@ -42,9 +45,16 @@ impl CovarianceValue {
     }
 
     /// The sum of two covariance functions, if `x` and `y` are such.
-    pub(super) fn sum(x: &Value, y: &Value) -> Option<Value> {
+    pub(super) fn sum(x: &Value, y: &Value) -> Option<Result<Value, String>> {
         let (x, y) = (x.downcast::<CovarianceValue>()?, y.downcast::<CovarianceValue>()?);
-        Some(Value::object(CovarianceValue(x.0.clone() + y.0.clone())))
+        Some(Self::joined(&x.0, &y.0, |x, y| x + y))
+    }
+
+    fn joined(x: &Covariance, y: &Covariance, join: fn(Covariance, Covariance) -> Covariance) -> Result<Value, String> {
+        if x.param_count() + y.param_count() > MOST_PARAMS {
+            return Err(format!("a covariance of more than {MOST_PARAMS} parameters"));
+        }
+        Ok(Value::object(CovarianceValue(join(x.clone(), y.clone()))))
     }
 }
 

@@ -5,7 +5,7 @@ use super::{Arg, Args, Pulled, Row, Type, arg, function, opt};
 use crate::lang::adjoint::Adjoint;
 use crate::lang::error::{Fault, FaultKind};
 use crate::lang::key::Key;
-use crate::lang::value::Value;
+use crate::lang::value::{MOST_ELEMENTS, Value};
 use smallvec::smallvec;
 use std::cmp::Ordering;
 use std::sync::Arc;
@@ -269,7 +269,7 @@ fn range(a: &Args) -> Result<Value, Fault> {
     if n.is_nan() || step == 0.0 {
         return Err(Fault::domain(format!("range: no steps of {step} lead from {start} to {end}")));
     }
-    if n > super::args::MAX_ELEMENTS as f64 {
+    if n > MOST_ELEMENTS as f64 {
         return Err(a.too_many(n));
     }
     Ok(array(n.max(0.0) as usize, |i| start + i as f64 * step))
@@ -278,8 +278,10 @@ fn range(a: &Args) -> Result<Value, Fault> {
 fn concat(a: &Args) -> Result<Value, Fault> {
     if let Value::Str(_) = a.get(0) {
         let parts = (0..a.values.len()).map(|i| a.str(i)).collect::<Result<Vec<_>, _>>()?;
+        a.fits(parts.iter().map(|p| p.len()).sum())?;
         return Ok(Value::Str(parts.concat().into()));
     }
+    a.fits(a.values.iter().filter_map(|v| v.len()).sum())?;
     // As below, without a value for each number.
     if a.values.iter().all(|v| matches!(v, Value::Array(_))) {
         let mut all = Vec::new();

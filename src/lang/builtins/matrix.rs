@@ -49,7 +49,10 @@ pub(super) const TABLE: &[Row] = &[
         Type::Array,
         "The diagonal matrix of a vector, or the diagonal of a matrix.",
         |a| match a.get(0) {
-            Value::Array(xs) => Ok(rows(xs.len(), |i| array(xs.len(), |j| if i == j { xs[i] } else { 0.0 }))),
+            Value::Array(xs) => {
+                a.fits(xs.len().saturating_mul(xs.len()))?;
+                Ok(rows(xs.len(), |i| array(xs.len(), |j| if i == j { xs[i] } else { 0.0 })))
+            }
             _ => {
                 let m = Matrix::read(a, 0)?;
                 Ok(array(m.rows.len().min(m.width), |i| m.rows[i][i]))
@@ -76,6 +79,7 @@ pub(super) const TABLE: &[Row] = &[
         "The matrix of the products `xs[i] * ys[j]`.",
         |a| {
             let (xs, ys) = (a.numbers(0)?, a.numbers(1)?);
+            a.fits(xs.len().saturating_mul(ys.len()))?;
             Ok(rows(xs.len(), |i| array(ys.len(), |j| xs[i] * ys[j])))
         },
     )
@@ -164,6 +168,7 @@ fn matmul(a: &Args) -> Result<Value, Fault> {
         let (m, n) = (left.width, right.width);
         return Err(Fault::type_error(format!("matmul: `a` has {m} columns, `b` has {n} rows")));
     }
+    a.fits(left.rows.len().saturating_mul(right.rows.len()))?;
     let cell = |i: usize, j: usize| dot(&left.rows[i], &right.rows[j]);
     Ok(match (is_vector(0), is_vector(1)) {
         (true, true) => Value::Num(cell(0, 0)),

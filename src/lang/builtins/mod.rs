@@ -35,7 +35,7 @@ use row::{Arg, Row, arg, function, opt};
 pub use table::{Constant, Table};
 
 use super::error::Fault;
-use super::value::Value;
+use super::value::{MOST_ELEMENTS, MOST_NESTED, Value};
 use crate::dist::Dist;
 use smallvec::SmallVec;
 use std::borrow::Cow;
@@ -214,10 +214,27 @@ impl Builtin {
         let args = Args { builtin: self, values };
         match self.kind {
             Kind::Function(f) => f(&args),
-            Kind::Distribution(f) => f(&args).map(|d| Value::Dist(std::sync::Arc::new(d))),
+            Kind::Distribution(_) => self.distribution(values).map(|d| Value::Dist(std::sync::Arc::new(d))),
             Kind::Form(_) | Kind::Inference => {
                 Err(Fault::type_error(format!("`{}` cannot be used as a function value", self.name)))
             }
+        }
+    }
+
+    /// The distribution it makes of values.
+    ///
+    /// # Errors
+    /// What is wrong with them, and if there is too much in it to be handled.
+    pub(crate) fn distribution(&self, values: &[&Value]) -> Result<Dist, Fault> {
+        let args = Args { builtin: self, values };
+        let Kind::Distribution(make) = self.kind else {
+            return Err(Fault::type_error(format!("`{}` is not a distribution", self.name)));
+        };
+        let d = make(&args)?;
+        match d.parts(MOST_NESTED, MOST_ELEMENTS) {
+            Some(n) if n <= MOST_ELEMENTS => Ok(d),
+            Some(_) => Err(args.too_large("parts", MOST_ELEMENTS)),
+            None => Err(args.too_large("distributions within each other", MOST_NESTED as usize)),
         }
     }
 

@@ -2,14 +2,13 @@
 //!
 //! Numbers follow IEEE 754: division by zero gives an infinity or NaN, which is caught where it is scored.
 
-use super::args::MAX_ELEMENTS;
 use super::covariance::CovarianceValue;
 use super::derivative::of_pairs;
 use super::elementwise::{self, array, array_len, broadcast, mapped, numeric};
 use super::math::pow_slopes;
 use super::{Arg, Args, Derivative, Row, Scalar, Type, arg, function};
 use crate::lang::error::Fault;
-use crate::lang::value::Value;
+use crate::lang::value::{MOST_ELEMENTS, Value};
 use std::cmp::Ordering;
 
 const SECTION: &str = "Operators";
@@ -113,8 +112,14 @@ pub(super) const TABLE: &[Row] = &[
 
 fn add(a: &Args) -> Result<Value, Fault> {
     numeric(a, a.get(0), a.get(1), elementwise::of_two(a), &|x, y| match (x, y) {
-        (Value::Str(x), Value::Str(y)) => Ok(Value::Str(format!("{x}{y}").into())),
-        _ => CovarianceValue::sum(x, y).ok_or_else(|| unsuited(a, "numbers or strings", x, y)),
+        (Value::Str(x), Value::Str(y)) => {
+            a.fits(x.len() + y.len())?;
+            Ok(Value::Str(format!("{x}{y}").into()))
+        }
+        _ => match CovarianceValue::sum(x, y) {
+            Some(sum) => sum.map_err(Fault::domain),
+            None => Err(unsuited(a, "numbers or strings", x, y)),
+        },
     })
 }
 
@@ -196,7 +201,7 @@ fn range(a: &Args) -> Result<Value, Fault> {
     };
     let (lo, hi) = (bound(0)?, bound(1)?);
     let n = (hi - lo).max(0.0);
-    if n > MAX_ELEMENTS as f64 {
+    if n > MOST_ELEMENTS as f64 {
         return Err(a.too_many(n));
     }
     Ok(array(n as usize, |i| lo + i as f64))

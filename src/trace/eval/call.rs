@@ -256,7 +256,7 @@ impl Graph {
             self.apply_at(n, b, &values)
         };
         let made = made.map_err(|e| self.fault(code, n, e))?;
-        Ok(self.finish_call(code, n, deps, made))
+        self.finish_call(code, n, deps, made)
     }
 
     pub(super) fn evaluate_mem(&mut self, code: &Code, n: NodeId, f: Operand) -> Result<Step, Failure> {

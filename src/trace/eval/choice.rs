@@ -1,7 +1,6 @@
 //! Random choices: drawn when first asked for, absorbing or changed after that.
 
 use crate::dist::{Datum, Dist};
-use crate::lang::builtins::{Args, Kind};
 use crate::lang::code::{Code, DistSpec, Op, Operand};
 use crate::lang::error::{Fault, FaultKind};
 use crate::lang::key::Key;
@@ -114,13 +113,7 @@ impl Graph {
         values: &[&Value],
     ) -> Result<Dist, Failure> {
         let made = match spec {
-            DistSpec::Family { builtin, .. } => {
-                let builtin = code.builtins.get(*builtin);
-                match builtin.kind {
-                    Kind::Distribution(make) => make(&Args { builtin, values }),
-                    _ => Err(Fault::type_error(format!("`{}` is not a distribution", builtin.name))),
-                }
-            }
+            DistSpec::Family { builtin, .. } => code.builtins.get(*builtin).distribution(values),
             DistSpec::Value(_) => match values[0] {
                 Value::Dist(d) => Ok(Dist::clone(d)),
                 Value::Likelihood(l) => {

@@ -267,7 +267,7 @@ impl Graph {
             _ => Value::from_elements(values),
         };
         self.set_deps(n, deps);
-        Ok(self.finish(code, n, value))
+        self.finish_made(code, n, value)
     }
 
     /// The entries of a container whose keys are those of its one loop.

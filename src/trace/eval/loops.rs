@@ -117,7 +117,7 @@ impl Graph {
                     self.let_side_go(code, n);
                 }
                 self.set_deps(n, deps);
-                return Ok(self.finish(code, n, value));
+                return self.finish_made(code, n, value);
             }
             v => {
                 let message = format!("map: needs a function, got {}", v.type_name());

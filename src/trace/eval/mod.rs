@@ -34,7 +34,7 @@ impl Graph {
                         Err(m) => return self.need(code, m),
                     };
                 let made = made.map_err(|e| self.fault(code, n, e))?;
-                Ok(self.finish_call(code, n, deps, made))
+                self.finish_call(code, n, deps, made)
             }
             Op::Array(items) => {
                 if let Some(step) = self.await_plain(code, n, frame, items)? {
@@ -43,7 +43,7 @@ impl Graph {
                 let mut deps = Deps::new();
                 let values = items.iter().map(|o| self.plain(code, frame, *o, &mut deps).clone()).collect();
                 self.set_deps(n, deps);
-                Ok(self.finish(code, n, Value::from_elements(values)))
+                self.finish_made(code, n, Value::from_elements(values))
             }
             Op::Record { names, values } => {
                 if let Some(step) = self.await_plain(code, n, frame, values)? {
@@ -53,7 +53,7 @@ impl Graph {
                 let fields = names.iter().zip(values.iter());
                 let fields = fields.map(|(k, o)| (k.clone(), self.plain(code, frame, *o, &mut deps).clone())).collect();
                 self.set_deps(n, deps);
-                Ok(self.finish(code, n, Value::Record(std::sync::Arc::new(fields))))
+                self.finish_made(code, n, Value::Record(std::sync::Arc::new(fields)))
             }
             Op::Closure(block) => Ok(self.finish(code, n, Value::Closure(Closure { block: *block, frame }))),
             Op::Index { base, keys } => self.evaluate_index(code, n, *base, keys),
@@ -173,16 +173,16 @@ impl Graph {
     }
 
     /// Ends the evaluation of a call.
-    fn finish_call(&mut self, code: &Code, n: NodeId, deps: Deps, made: Made) -> Step {
+    fn finish_call(&mut self, code: &Code, n: NodeId, deps: Deps, made: Made) -> Result<Step, Failure> {
         match made {
             Made::Value(value) => {
                 self.set_deps(n, deps);
-                self.finish(code, n, value)
+                self.finish_made(code, n, value)
             }
             Made::Kept(before) => {
                 let value = before.value.clone();
                 self.keep(n, deps, before);
-                self.finish(code, n, value)
+                self.finish_made(code, n, value)
             }
         }
     }

@@ -4,7 +4,7 @@
 //! all its fields are, else of bools if all are `true` or `false`, else of strings. There are no missing values: an empty
 //! field in a column of numbers is an error, not a NaN that shows up later.
 
-use crate::lang::value::{Record, Value};
+use crate::lang::value::{MOST_ELEMENTS, Record, Value};
 use std::sync::Arc;
 
 /// A row and the line it starts in, from 1.
@@ -71,6 +71,7 @@ fn rows(text: &str, separator: char) -> Result<Vec<Row>, String> {
     let mut rows: Vec<Row> = Vec::new();
     let (mut row, mut field) = (Vec::new(), String::new());
     let (mut line, mut start) = (1, 1);
+    let mut fields = 0usize;
     let mut chars = text.chars().peekable();
     while let Some(c) = chars.next() {
         match c {
@@ -92,10 +93,17 @@ fn rows(text: &str, separator: char) -> Result<Vec<Row>, String> {
                     chars.next_if_eq(&'\n');
                 }
                 end_row(&mut rows, &mut row, &mut field, start);
+                fields += 1;
                 line += 1;
                 start = line;
             }
-            c if c == separator => row.push(std::mem::take(&mut field)),
+            c if c == separator => {
+                fields += 1;
+                if fields > MOST_ELEMENTS {
+                    return Err(format!("line {line}: more than {MOST_ELEMENTS} fields"));
+                }
+                row.push(std::mem::take(&mut field));
+            }
             c => field.push(c),
         }
     }

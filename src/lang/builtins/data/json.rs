@@ -1,11 +1,21 @@
 //! JSON (RFC 8259) as values: objects are records in their order, arrays of numbers pack, null is nothing.
 
-use crate::lang::value::Value;
+use crate::lang::value::{Extent, MOST_ELEMENTS, Value};
 use std::sync::Arc;
+
+/// The most bytes of a JSON text that is read as a value: its elements take many times as much.
+const MOST_BYTES: usize = 1 << 26;
 
 /// The value of a JSON text. Nesting is limited by the reader, to 128.
 pub(super) fn parse(bytes: &[u8]) -> Result<Value, String> {
-    serde_json::from_slice(bytes).map(convert).map_err(|e| e.to_string())
+    if bytes.len() > MOST_BYTES {
+        return Err(format!("{} bytes of JSON; at most {MOST_BYTES}", bytes.len()));
+    }
+    let value = serde_json::from_slice(bytes).map(convert).map_err(|e| e.to_string())?;
+    match value.extent() {
+        Extent::TooLarge => Err(format!("more than {MOST_ELEMENTS} elements")),
+        Extent::Fits | Extent::TooDeep => Ok(value),
+    }
 }
 
 fn convert(json: serde_json::Value) -> Value {

@@ -25,6 +25,10 @@ impl Object for SolidValue {
         self
     }
 
+    fn own_numbers(&self) -> usize {
+        self.0.own_numbers()
+    }
+
     fn field(&self, name: &str) -> Option<Value> {
         let bounds = || self.0.bounds();
         match name {

@@ -3,12 +3,15 @@
 use super::{AFFINE, AffineValue, SOLID, SolidValue, fault, native, shape_pulls};
 use crate::geom::{Affine, Caps, Landmark, Profile, Solid, cuboid};
 use crate::lang::builtins::{Args, Row, Type, arg, opt};
-use crate::lang::error::Fault;
+use crate::lang::error::{Fault, FaultKind};
 use crate::lang::value::Value;
 use glam::DVec3;
 use std::sync::Arc;
 
 const SECTION: &str = "Shapes";
+
+/// The most meshes of a group.
+const MOST_MESHES: usize = 100_000;
 
 pub(super) const TABLE: &[Row] = &[
     native(
@@ -63,6 +66,11 @@ pub(super) const TABLE: &[Row] = &[
         let members = members.collect::<Result<Vec<_>, _>>()?;
         if members.is_empty() {
             return Err(a.wrong(0, "an array of solids"));
+        }
+        let count: usize = members.iter().map(|s| s.instances().len()).sum();
+        if count > MOST_MESHES {
+            let message = format!("scene.group: a group of {count} meshes; at most {MOST_MESHES}");
+            return Err(Fault::new(FaultKind::Limit, message));
         }
         Ok(Value::object(SolidValue(Solid::group(&members))))
     })

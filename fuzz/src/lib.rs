@@ -1,0 +1,243 @@
+//! What fuzzing tries, one function a target: whatever the bytes, a result or an error, no panic, and what was read can be used.
+//!
+//! `tests/fuzz.rs` compiles these functions as well and runs them on seeds and on every input that once went wrong.
+
+use pcadlang::bank::Bank;
+use pcadlang::diag::{IntoDiagnostic, SourceMap, render};
+use pcadlang::geom::{FileFrame, UpAxis, gltf as gltf_file, obj as obj_file};
+use pcadlang::lang::builtins::data::{Options, load};
+use pcadlang::num::fnv1a;
+use pcadlang::render::Camera;
+use pcadlang::syntax::{parse, print, span::FileId};
+use pcadlang::trace::{Limits, SavedTrace, Trace};
+use pcadlang::vision::features::Query;
+use pcadlang::vision::keypoints::People;
+use pcadlang::vision::{Limits as Pixels, depth, mask, npy, photo};
+use pcadlang::{Model, Program, RunOptions};
+use std::sync::{Arc, OnceLock};
+use std::time::Duration;
+
+/// Pictures of a size that many can be tried of in a second.
+const PIXELS: Pixels = Pixels { max_side: 512, max_pixels: 1 << 16 };
+
+/// Reads data as a program does, with a file beside it for whatever name it asks for.
+fn data(kind: &str, file: &str, bytes: &[u8], beside: &[u8]) -> bool {
+    load(kind, file, bytes, &Options::default(), &|_| Ok(beside.to_vec())).is_ok()
+}
+
+/// A program's text: every mistake can be shown, and what has none is printed and read back the same.
+pub fn program_text(bytes: &[u8]) {
+    let mut sources = SourceMap::new();
+    let Ok(file) = sources.add_bytes("fuzz.pcad", bytes) else { return };
+    let text = sources.get(file).map(|f| f.text().to_string()).unwrap_or_default();
+    let (program, errors) = parse(&text, FileId(0));
+    if errors.is_empty() {
+        let printed = print(&program);
+        let (again, errors) = parse(&printed, FileId(0));
+        assert!(errors.is_empty(), "{printed}");
+        assert_eq!(print(&again), printed);
+    }
+    let all: Vec<_> = errors.into_iter().map(IntoDiagnostic::into_diagnostic).collect();
+    assert_eq!(all.is_empty(), render(&sources, &all, false).is_empty());
+}
+
+/// A whole program: compiled, and run for a few steps within small limits.
+pub fn program(bytes: &[u8]) {
+    let Ok(text) = std::str::from_utf8(bytes) else { return };
+    let program = match Program::parse(text) {
+        Ok(program) => program,
+        Err(e) => return assert!(!e.to_string().is_empty()),
+    };
+    match program.limits(small()).compile() {
+        Ok(model) => run(&model),
+        Err(e) => assert!(!e.to_string().is_empty()),
+    }
+}
+
+fn run(model: &Model) {
+    let time = Some(Duration::from_millis(500));
+    let options = RunOptions { steps: Some(20), warmup: Some(10), time, limits: small(), ..RunOptions::default() };
+    match model.run(&options, 1, 1) {
+        Ok(posterior) => {
+            let last = &posterior.chains[0].last;
+            assert!(!last.log_joint().is_nan());
+            reload(model, &last.save(model.hash()));
+        }
+        Err(e) => assert!(!e.to_string().is_empty()),
+    }
+}
+
+/// Limits under which a program takes a fraction of a second.
+fn small() -> Limits {
+    Limits { depth: 200, nodes: 20_000, elements: 1_000_000, operations: 100_000, ..Limits::default() }
+}
+
+/// What a saved trace gives when loaded is saved as the same.
+fn reload(model: &Model, saved: &SavedTrace) {
+    if let Ok(trace) = Trace::load(Arc::clone(model.code()), model.hash(), saved, small()) {
+        let again = trace.save(model.hash());
+        let both = [&again, &again].map(|s| serde_json::to_string(s).unwrap_or_default());
+        assert_eq!(both[0], both[1]);
+    }
+}
+
+/// A mesh in Wavefront OBJ: what is read can be written and read again.
+pub fn obj(bytes: &[u8]) {
+    let frame = FileFrame::new(UpAxis::Z, 0.01).unwrap_or_default();
+    let _ = obj_file::load_in(bytes, &frame);
+    let indexed = obj_file::indexed(bytes);
+    if let Ok(mesh) = obj_file::load(bytes) {
+        assert!(indexed.is_ok_and(|i| i.triangles.len() >= mesh.topology.triangles.len()));
+        let again = obj_file::load(obj_file::write(&mesh).as_bytes());
+        assert!(again.is_ok_and(|m| m.topology.triangles.len() == mesh.topology.triangles.len()));
+        data("mesh", "x.obj", bytes, &[]);
+    }
+}
+
+/// A glTF file, in either form; what is beside it is one small buffer.
+pub fn gltf(bytes: &[u8]) {
+    let beside = [0u8; 256];
+    let read = |_: &str| Ok(beside.to_vec());
+    if let Ok(loaded) = gltf_file::load(bytes, &FileFrame::default(), &read) {
+        assert!(loaded.triangles.iter().flatten().all(|v| (*v as usize) < loaded.positions.len()));
+        let _ = loaded.clone().mesh();
+        let _ = loaded.armature();
+    }
+    data("mesh", "x.gltf", bytes, &beside);
+    data("armature", "x.gltf", bytes, &beside);
+}
+
+/// A rig file, then a zero byte, then the file beside it, which stands for its mesh and its morphs.
+pub fn rig(bytes: &[u8]) {
+    let (rig, beside) = match bytes.iter().position(|b| *b == 0) {
+        Some(i) => (&bytes[..i], &bytes[i + 1..]),
+        None => (bytes, CORNER),
+    };
+    data("armature", "x.rig.json", rig, beside);
+    if let Ok(file) = pcadlang::geom::armature::rig_from_json(rig) {
+        let _ = pcadlang::geom::armature::morphs_from_json(beside, &file.rig);
+    }
+}
+
+/// A mesh of one triangle.
+const CORNER: &[u8] = b"v 0 0 0\nv 1 0 0\nv 0 1 0\nf 1 2 3\n";
+
+/// A picture, PNG or JPEG, as a photograph, mask, and depth map.
+pub fn image(bytes: &[u8]) {
+    if let Ok(photo) = photo::decode(bytes, &PIXELS) {
+        assert!(photo.width() > 0 && photo.height() > 0);
+        assert!(u64::from(photo.width()) * u64::from(photo.height()) <= PIXELS.max_pixels);
+        let small = photo.shrunk(32);
+        assert!(small.width() <= 32 && small.height() <= 32);
+        let _ = mask::decode(bytes, &PIXELS);
+        let _ = depth::decode(bytes, 1000.0, &PIXELS);
+    }
+}
+
+/// An array in numpy's format, as a mask and depth map.
+pub fn array(bytes: &[u8]) {
+    if let Ok(array) = npy::parse(bytes) {
+        let count: usize = array.shape.iter().product();
+        assert_eq!(array.clone().into_f32().len(), count);
+    }
+    if let Ok(mask) = mask::decode(bytes, &PIXELS) {
+        assert_eq!(mask.data().len() as u64, u64::from(mask.width()) * u64::from(mask.height()));
+        let _ = mask.resized(8, 8);
+    }
+    if let Ok(depth) = depth::decode(bytes, 1.0, &PIXELS) {
+        assert_eq!(depth.data().len() as u64, u64::from(depth.width()) * u64::from(depth.height()));
+        let _ = depth.resized(8, 8);
+    }
+}
+
+/// A camera: what is read has numbers that are finite, and is written and read back the same.
+pub fn camera(bytes: &[u8]) {
+    let Ok(text) = std::str::from_utf8(bytes) else { return };
+    match Camera::from_json(text) {
+        Ok(camera) => {
+            for v in [camera.eye, camera.right, camera.up, camera.forward] {
+                assert!(v.is_finite(), "{camera:?}");
+            }
+            let again = Camera::from_json(&camera.to_json());
+            assert!(again.is_ok_and(|a| (a.width, a.height) == (camera.width, camera.height)));
+        }
+        Err(e) => assert!(!e.to_string().is_empty()),
+    }
+}
+
+/// The program whose saved traces are tried.
+const TRACED: &str = "fn f(n) { s ~ flip(0.5); if s and n < 5 { 1 + f(n + 1) } else { 0 } }
+assume n = f(0); assume k ~ poisson(3); for i in 0 .. 3 { x[i] ~ normal(0, 1); }
+assume w ~ dirichlet([1, 2, 3]); assume c ~ categorical(w); assume v ~ mv_normal([0, 0], [[2, 1], [1, 2]]);
+observe normal(n + k + c + sum(v) + x[0] + x[1] + x[2], 1) = 2;";
+
+/// The program of [`trace`], compiled once.
+///
+/// # Panics
+/// If it does not compile.
+pub fn traced() -> &'static Model {
+    static MODEL: OnceLock<Model> = OnceLock::new();
+    MODEL.get_or_init(|| Model::from_text(TRACED).unwrap_or_else(|e| panic!("{e}")))
+}
+
+/// A saved trace, as of a program of ours whatever it says.
+pub fn trace(bytes: &[u8]) {
+    let Ok(mut saved) = serde_json::from_slice::<SavedTrace>(bytes) else { return };
+    saved.program = traced().hash().to_owned();
+    saved.version = 1;
+    reload(traced(), &saved);
+}
+
+/// A bank: its header, every kind of entry, and a search. The hash of the header is put right, or nothing would get past it.
+pub fn bank(bytes: &[u8]) {
+    let mut bytes = bytes.to_vec();
+    let header =
+        bytes.get(40..48).and_then(|w| w.try_into().ok()).map_or(usize::MAX, |w| u64::from_le_bytes(w) as usize);
+    if let Some(hash) = bytes.get(header..).map(fnv1a)
+        && let Some(place) = bytes.get_mut(48..56)
+    {
+        place.copy_from_slice(&hash.to_le_bytes());
+    }
+    let path = std::env::temp_dir().join(format!("pcadlang-fuzz-{}.bank", std::process::id()));
+    if std::fs::write(&path, &bytes).is_err() {
+        return;
+    }
+    if let Ok(bank) = Bank::open(&path) {
+        let last = bank.len().saturating_sub(1);
+        for i in [0, last / 2, last, bank.len()] {
+            let _ = bank.latents(i);
+        }
+        if let Ok(features) = bank.features(0) {
+            let near = bank.nearest(&Query::new(features.clone()), 3);
+            assert!(near.map_or(0, |n| n.len()) <= 3);
+            let _ = bank.neighbours(&Query::new(features), 3);
+        }
+        let _ = bank.check("another");
+    }
+    let _ = std::fs::remove_file(&path);
+}
+
+/// What a pose detector writes.
+pub fn keypoints(bytes: &[u8]) {
+    match People::parse(bytes) {
+        Ok(people) => {
+            let ids: Vec<String> = people.ids().map(str::to_owned).collect();
+            let _ = people.pick(None, Some("000001"));
+            for id in ids.iter().take(3) {
+                if let Ok(found) = people.pick(Some(id), None) {
+                    let found = found.in_image(64, 48);
+                    for p in found.points() {
+                        assert!(found.position(p, (64, 48)).iter().all(|x| !x.is_nan()));
+                    }
+                }
+            }
+        }
+        Err(e) => assert!(!e.message.is_empty()),
+    }
+}
+
+/// A table: the first byte says whether it is CSV or JSON.
+pub fn table(bytes: &[u8]) {
+    let Some((kind, rest)) = bytes.split_first() else { return };
+    data(if kind % 2 == 0 { "json" } else { "csv" }, "x", rest, &[]);
+}

@@ -1,0 +1,130 @@
+//! What a program may read: files below some folders, and files that were named from outside. Symbolic links and `..` are followed
+//! before anything is compared. A file that is exchanged between the comparison and the reading is not noticed.
+
+use super::load::Loader;
+use std::fmt;
+use std::io::{self, Read};
+use std::path::{Path, PathBuf};
+
+/// The folders and files that a program may read; by default none.
+#[derive(Clone, Debug, Default)]
+pub struct Reach {
+    /// Without links and `..`.
+    folders: Vec<PathBuf>,
+    /// As they were named, and without links and `..`.
+    files: Vec<(PathBuf, PathBuf)>,
+}
+
+/// A file that is there, or would be, where a program may not read.
+#[derive(Debug)]
+pub struct Outside {
+    /// The folder to allow.
+    folder: PathBuf,
+}
+
+impl fmt::Display for Outside {
+    fn fmt(&self, f: &mut fmt::Formatter<'_>) -> fmt::Result {
+        write!(f, "it is outside of the folders that the program may read")
+    }
+}
+
+impl std::error::Error for Outside {}
+
+impl Outside {
+    /// What to try, if an error is a refusal.
+    pub fn hint(e: &io::Error) -> Option<String> {
+        let refused = e.get_ref()?.downcast_ref::<Outside>()?;
+        Some(format!(
+            "a program reads below its own folder; --allow-read {} lets it read there too",
+            refused.folder.display()
+        ))
+    }
+}
+
+impl Reach {
+    /// That of a program in a file: the file, wherever it may lie in truth, and all below its folder.
+    ///
+    /// # Errors
+    /// If the folder cannot be read.
+    pub fn of_program(path: &str) -> io::Result<Reach> {
+        let path = Path::new(path);
+        let mut reach = Reach::default().allow(folder_of(path))?;
+        if let Ok(real) = path.canonicalize() {
+            reach.files.push((path.to_owned(), real));
+        }
+        Ok(reach)
+    }
+
+    /// The same, and all below a folder.
+    ///
+    /// # Errors
+    /// If there is no such folder.
+    pub fn allow(mut self, folder: &Path) -> io::Result<Reach> {
+        let real = folder.canonicalize()?;
+        if !real.is_dir() {
+            return Err(io::ErrorKind::NotADirectory.into());
+        }
+        self.folders.push(real);
+        Ok(self)
+    }
+
+    /// The file to read for a path.
+    ///
+    /// # Errors
+    /// If there is none, or it may not be read. What lies outside is not told from what does not exist there.
+    pub fn resolve(&self, path: &Path) -> io::Result<PathBuf> {
+        let outside = |folder: &Path| Err(io::Error::other(Outside { folder: folder.to_owned() }));
+        match path.canonicalize() {
+            Ok(real) => {
+                let named = self.files.iter().any(|(name, file)| name == path && *file == real);
+                if named || self.holds(&real) { Ok(real) } else { outside(folder_of(&real)) }
+            }
+            Err(e) => match path.ancestors().skip(1).find_map(|p| existing(p).canonicalize().ok()) {
+                Some(nearest) if !self.holds(&nearest) => outside(&nearest),
+                _ => Err(e),
+            },
+        }
+    }
+
+    fn holds(&self, real: &Path) -> bool {
+        self.folders.iter().any(|f| real.starts_with(f))
+    }
+}
+
+impl Loader for Reach {
+    fn read(&self, path: &str) -> io::Result<Vec<u8>> {
+        let real = self.resolve(Path::new(path))?;
+        let found = real.metadata()?;
+        // A pipe would wait for ever.
+        if !found.is_file() && !found.is_dir() {
+            return Err(io::Error::other("it is no plain file"));
+        }
+        read_file(&real)
+    }
+}
+
+/// The most bytes of a file that is read whole.
+pub const MOST_BYTES: u64 = 1 << 29;
+
+/// The bytes of a file that is not too large.
+///
+/// # Errors
+/// As the file system has it, and if it has more than [`MOST_BYTES`].
+pub fn read_file(path: &Path) -> io::Result<Vec<u8>> {
+    let mut bytes = Vec::new();
+    std::fs::File::open(path)?.take(MOST_BYTES + 1).read_to_end(&mut bytes)?;
+    match bytes.len() as u64 > MOST_BYTES {
+        true => Err(io::Error::other(format!("it is too large; at most {MOST_BYTES} bytes are read"))),
+        false => Ok(bytes),
+    }
+}
+
+/// The folder of a file.
+pub fn folder_of(file: &Path) -> &Path {
+    existing(file.parent().unwrap_or(file))
+}
+
+/// The empty path is the folder one is in.
+fn existing(path: &Path) -> &Path {
+    if path.as_os_str().is_empty() { Path::new(".") } else { path }
+}

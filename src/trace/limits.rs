@@ -1,0 +1,185 @@
+//! Bounds on what a program may build and how long one evaluation may take: errors at a place in the program, rather than memory
+//! or patience that run out. The numbers are in `docs/reliability.md`.
+
+use super::demand::Failure;
+use super::graph::Graph;
+use super::node::NodeId;
+use crate::lang::code::Code;
+use crate::lang::error::FaultKind;
+use crate::lang::value::{Extent, MOST_ELEMENTS, MOST_NESTED, Value};
+use crate::platform::clock::Instant;
+use std::sync::Arc;
+use std::sync::atomic::{AtomicBool, Ordering};
+use std::time::Duration;
+
+/// Bounds on what a program may build.
+#[derive(Clone, Debug)]
+pub struct Limits {
+    /// Calls within calls.
+    pub depth: u32,
+    /// Nodes of the trace: at 100 to 200 bytes each, most of its memory.
+    pub nodes: u32,
+    /// Elements of all arrays that one update makes, and numbers of its meshes: some eight bytes each.
+    pub elements: u64,
+    /// Nodes that one update evaluates.
+    pub operations: u64,
+    /// When to give up in the middle of an update.
+    pub stop: Stop,
+}
+
+impl Default for Limits {
+    fn default() -> Self {
+        Limits { depth: 10_000, nodes: 20_000_000, elements: 500_000_000, operations: u64::MAX, stop: Stop::default() }
+    }
+}
+
+impl Limits {
+    /// The limits that are numbers, by name.
+    pub const NAMES: [&str; 4] = ["depth", "nodes", "elements", "operations"];
+
+    /// The same with another number for the limit of a name.
+    ///
+    /// # Errors
+    /// A name that is none of [`Limits::NAMES`], or a number that is too large for it.
+    pub fn with(mut self, name: &str, number: u64) -> Result<Limits, String> {
+        let small = || u32::try_from(number).map_err(|_| format!("{name} is at most {}", u32::MAX));
+        match name {
+            "depth" => self.depth = small()?,
+            "nodes" => self.nodes = small()?,
+            "elements" => self.elements = number,
+            "operations" => self.operations = number,
+            _ => return Err(format!("there is no limit `{name}`: there are {}", Limits::NAMES.join(", "))),
+        }
+        Ok(self)
+    }
+}
+
+/// How to raise a limit, for hints.
+pub(super) fn raise(name: &str) -> String {
+    format!("raise it with --limit {name}=N")
+}
+
+/// When to give up in the middle of an update: some time after it was asked for, or after time is up. Until then an update may end by
+/// itself, so that a state is left in which everything has run.
+#[derive(Clone, Debug, Default)]
+pub struct Stop {
+    asked: Option<Arc<AtomicBool>>,
+    /// Since when it has how much time.
+    time: Option<(Instant, Duration)>,
+    patience: Duration,
+}
+
+/// How long an update may go on after it was asked to stop, where nobody says.
+const PATIENCE: Duration = Duration::from_secs(2);
+/// So many evaluations go by between two looks at the clock, but for the last of them.
+const BETWEEN_LOOKS: u32 = 1 << 12;
+
+impl Stop {
+    /// Two seconds after this is set.
+    pub fn when(asked: Arc<AtomicBool>) -> Stop {
+        Stop { asked: Some(asked), time: None, patience: PATIENCE }
+    }
+
+    /// Also when so much time has gone by from now on.
+    #[must_use]
+    pub fn or_within(self, time: Option<Duration>) -> Stop {
+        Stop { time: time.map(|t| (Instant::now(), t)), ..self }
+    }
+
+    /// With another time than two seconds in which an update may end by itself.
+    #[must_use]
+    pub fn after(self, patience: Duration) -> Stop {
+        Stop { patience, ..self }
+    }
+
+    /// Whether it has been asked for, or time is up.
+    pub fn is_asked(&self) -> bool {
+        self.asked.as_ref().is_some_and(|a| a.load(Ordering::Relaxed))
+            || self.time.is_some_and(|(from, t)| from.elapsed() >= t)
+    }
+}
+
+/// What an update has used up of its limits.
+#[derive(Clone, Debug, Default)]
+pub(crate) struct Spent {
+    operations: u64,
+    elements: u64,
+    /// Evaluations since the clock was looked at, over all updates: many short ones take time as well.
+    since_look: u32,
+    /// Since when it should have stopped.
+    late: Option<Instant>,
+}
+
+impl Spent {
+    /// At the beginning of an update.
+    pub fn renew(&mut self) {
+        (self.operations, self.elements) = (0, 0);
+    }
+}
+
+impl Graph {
+    /// Counts one evaluation.
+    #[inline]
+    pub(super) fn count_operation(&mut self, code: &Code, n: NodeId) -> Result<(), Failure> {
+        self.spent.operations += 1;
+        self.spent.since_look += 1;
+        if self.spent.operations > self.limits.operations {
+            let message = format!("one evaluation took more than {} operations", self.limits.operations);
+            return Err(self.fail(code, n, FaultKind::Limit, message, Some(raise("operations"))));
+        }
+        if self.spent.since_look >= BETWEEN_LOOKS { self.look_at_clock(code, n) } else { Ok(()) }
+    }
+
+    #[cold]
+    fn look_at_clock(&mut self, code: &Code, n: NodeId) -> Result<(), Failure> {
+        self.spent.since_look = 0;
+        if !self.limits.stop.is_asked() {
+            self.spent.late = None;
+            return Ok(());
+        }
+        let since = *self.spent.late.get_or_insert_with(Instant::now);
+        if since.elapsed() < self.limits.stop.patience {
+            return Ok(());
+        }
+        let message = "stopped in the middle of an evaluation".to_owned();
+        let hint = "one evaluation of the program took longer than was left".to_owned();
+        Err(self.fail(code, n, FaultKind::Stopped, message, Some(hint)))
+    }
+
+    /// Counts the elements of a value that a node made, and refuses what is too large or too deep to be handled.
+    #[inline]
+    pub(super) fn count_elements(&mut self, code: &Code, n: NodeId, value: &Value) -> Result<(), Failure> {
+        let made = match value {
+            Value::Num(_) | Value::Bool(_) => return Ok(()),
+            Value::Array(xs) => xs.len(),
+            Value::Str(s) => s.len() / 8,
+            Value::List(_) | Value::Record(_) => {
+                self.check_extent(code, n, value)?;
+                value.len().unwrap_or(0)
+            }
+            Value::Object(o) => o.own_numbers(),
+            _ => return Ok(()),
+        };
+        self.spent.elements += made as u64;
+        if self.spent.elements > self.limits.elements {
+            let message = format!("what one evaluation makes has more than {} elements", self.limits.elements);
+            return Err(self.fail(code, n, FaultKind::Limit, message, Some(raise("elements"))));
+        }
+        Ok(())
+    }
+
+    fn check_extent(&self, code: &Code, n: NodeId, value: &Value) -> Result<(), Failure> {
+        let (message, hint) = match value.extent() {
+            Extent::Fits => return Ok(()),
+            Extent::TooDeep => (
+                format!("arrays and records are nested more than {MOST_NESTED} deep"),
+                "keep what grows in one array: append(xs, x)",
+            ),
+            Extent::TooLarge => (
+                format!("a value of more than {MOST_ELEMENTS} elements, those of its elements counted"),
+                "an array that is used several times counts each time",
+            ),
+        };
+        Err(self.fail(code, n, FaultKind::Limit, message, Some(hint.into())))
+    }
+}

@@ -1,0 +1,161 @@
+//! Programs that would take more memory, stack or time than there is: an error at a place, with what to do about it.
+
+use pcadlang::infer::Progress;
+use pcadlang::report::Memory;
+use pcadlang::trace::Limits;
+use pcadlang::{Model, Program, RunOptions};
+use std::sync::atomic::Ordering;
+use std::time::{Duration, Instant};
+
+/// The error of one draw of a program.
+fn error_within(text: &str, limits: Limits) -> String {
+    let drawn = Program::parse(text).and_then(|p| p.limits(limits).compile()).and_then(|m| m.simulate(1, 0));
+    drawn.map(|_| ()).expect_err(text).to_string()
+}
+
+fn says(text: &str, part: &str) {
+    let e = error_within(text, Limits::default());
+    assert!(e.contains(part) && e.contains("<program>:1:"), "{text}\n{part:?} is not in\n{e}");
+}
+
+/// A value made in so many steps, each from the one before.
+fn grown(step: &str, from: &str, times: &str) -> String {
+    format!("let v = fold(fn(a, i) {{ {step} }}, {from}, 0 .. {times}); observe normal(0, 1) = len(v);")
+}
+
+#[test]
+fn values_that_are_nested_too_deep() {
+    for step in ["[a, \"x\"]", "{ a: a }", "[[a]]", "map(fn(i) { a }, [\"x\"])"] {
+        says(&grown(step, "[\"x\"]", "100000"), "nested more than 200 deep");
+    }
+    let observed = |d: &str| format!("let d = {d}; observe d = 3;");
+    says(&observed("fold(fn(d, i) { iid(d, 1) }, normal(0, 1), 0 .. 20000)"), "more than 200 distributions");
+    let mixture = "fold(fn(d, i) { mixture([1, 1], [d, normal(0, 1)]) }, normal(0, 1), 0 .. 20000)";
+    says(&observed(mixture), "more than 200 distributions within each other");
+    let sum = "let c = fold(fn(c, i) { c + white(1) }, white(1), 0 .. 20000); observe gp(0, c, [0, 1]) = [1, 2];";
+    says(sum, "more than 200 parameters");
+    let product = "let c = fold(fn(c, i) { c * white(1) }, white(1), 0 .. 20000); observe gp(0, c, [0, 1]) = [1, 2];";
+    says(product, "more than 200 parameters");
+}
+
+/// Short programs whose values would have more elements than a memory has bytes.
+#[test]
+fn values_that_are_too_large() {
+    says(&grown("[a, a, \"x\"]", "[\"x\"]", "60"), "more than 10000000 elements");
+    says(&grown("{ a: a, b: a }", "[\"x\"]", "60"), "more than 10000000 elements");
+    says(&grown("concat(a, a)", "[1, 2]", "60"), "concat: an array of 16777216 elements");
+    says(&grown("concat(a, a)", "\"ab\"", "60"), "concat: an array of 16777216 elements");
+    says(&grown("a + a", "\"ab\"", "60"), "an array of 16777216 elements");
+    says("let v = fill(zeros(1e7), 1e7); observe normal(0, 1) = len(v);", "more than 10000000 elements");
+    says("let v = diag(zeros(1e6)); observe normal(0, 1) = len(v);", "diag: an array of 1000000000000 elements");
+    says("let v = outer(zeros(1e6), ones(1e6)); observe normal(0, 1) = len(v);", "outer: an array of");
+    let column = "map(fn(i) { [i] }, 0 .. 5000)";
+    let product = format!("let c = {column}; let v = matmul(c, [zeros(5000)]); observe normal(0, 1) = len(v);");
+    says(&product, "matmul: an array of 25000000 elements");
+    says("let v = 0 .. 1e12; observe normal(0, 1) = len(v);", "an array of 1000000000000 elements");
+    says("v ~ iid(normal(0, 1), 1e9); observe normal(0, 1) = v[0];", "iid: an array of 1000000000 elements");
+    says("observe iid(iid(normal(0, 1), 1e5), 1e5) = 1;", "iid: more than 10000000 parts");
+    let mixture = "fold(fn(d, i) { mixture([1, 1], [d, d]) }, normal(0, 1), 0 .. 60)";
+    says(&format!("let d = {mixture}; observe d = 3;"), "mixture: more than 10000000 parts");
+    says("let c = white(1); observe gp(0, c, 0 .. 100000) = 1;", "at most 4000 points");
+}
+
+#[test]
+fn solids_that_are_too_large() {
+    let scene = "include \"std/scene.pcad\" as scene; ";
+    let doubled = "fold(fn(s, i) { scene.group([s, s]) }, scene.sphere(1), 0 .. 60)";
+    says(&format!("{scene}let s = {doubled}; observe normal(0, 1) = s.height;"), "at most 100000");
+    let limits = Limits { elements: 10_000_000, ..Limits::default() };
+    let spheres = "map(fn(i) { scene.sphere(1 + i, sides = 1024) }, 0 .. 100)";
+    let e = error_within(&format!("{scene}let s = scene.group({spheres}); observe normal(0, 1) = s.height;"), limits);
+    assert!(e.contains("more than 10000000 elements") && e.contains("--limit elements=N"), "{e}");
+    // Placed again and again, it is as it should be.
+    let moved = "fold(fn(s, i) { scene.affine(translate = [0.001, 0, 0]) * s }, scene.sphere(1), 0 .. 5000)";
+    let text = format!("{scene}let s = {moved}; assume x ~ normal(0, 1); observe normal(x, 1) = s.height;");
+    assert!(Model::from_text(&text).and_then(|m| m.simulate(1, 0)).is_ok());
+}
+
+#[test]
+fn limits_can_be_set_and_say_how() {
+    let nested = "fn f(n) { 1 + f(n + 1) } observe normal(f(0), 1) = 0;";
+    let e = error_within(nested, Limits::default().with("depth", 50).unwrap());
+    assert!(e.contains("nested more than 50 deep") && e.contains("--limit depth=N"), "{e}");
+    let wide = "let v = map(fn(i) { i + 1 }, 0 .. 10000); observe normal(sum(v), 1) = 0;";
+    let e = error_within(wide, Limits::default().with("nodes", 1000).unwrap());
+    assert!(e.contains("beyond 1000 nodes") && e.contains("--limit nodes=N"), "{e}");
+    let e = error_within(wide, Limits::default().with("operations", 5000).unwrap());
+    assert!(e.contains("more than 5000 operations") && e.contains("--limit operations=N"), "{e}");
+    let arrays = "let v = map(fn(i) { sum(zeros(1000) + i) }, 0 .. 1000); observe normal(sum(v), 1) = 0;";
+    let e = error_within(arrays, Limits::default().with("elements", 100_000).unwrap());
+    assert!(e.contains("more than 100000 elements") && e.contains("--limit elements=N"), "{e}");
+    for text in [wide, arrays] {
+        assert!(Model::from_text(text).and_then(|m| m.simulate(1, 0)).is_ok(), "{text}");
+    }
+    assert!(Limits::default().with("patience", 1).is_err());
+    assert!(Limits::default().with("depth", u64::MAX).is_err());
+}
+
+/// An evaluation that takes far longer than anybody waits.
+const LONG: &str = "fn f(a) { sum(map(fn(i) { sum(map(fn(j) { i * j + a }, 0 .. 1000)) }, 0 .. 1000000)) }
+    assume x ~ normal(0, 1); observe normal(f(x), 1) = 0; infer { repeat 100 { mh(@x); } }";
+
+#[test]
+fn an_evaluation_ends_when_time_is_up() {
+    let model = Model::from_text(LONG).unwrap();
+    let begun = Instant::now();
+    let options = RunOptions { time: Some(Duration::from_millis(200)), ..RunOptions::default() };
+    let e = model.run(&options, 1, 1).err().expect("there is no time for it").to_string();
+    assert!(e.contains("stopped in the middle of an evaluation"), "{e}");
+    assert!(begun.elapsed() < Duration::from_secs(60), "{:?}", begun.elapsed());
+}
+
+#[test]
+fn an_evaluation_ends_when_somebody_asks() {
+    let model = Model::from_text(LONG).unwrap();
+    let progress = Progress::default();
+    let cancelled = progress.cancelled.clone();
+    std::thread::spawn(move || {
+        std::thread::sleep(Duration::from_millis(100));
+        cancelled.store(true, Ordering::Relaxed);
+    });
+    let results = model.run_into(&RunOptions::default(), 1, &progress, vec![Box::new(Memory::default())]).unwrap();
+    assert!(results.iter().all(Result::is_err), "it cannot have come to an end");
+}
+
+/// Steps that were made before one that takes too long are kept.
+#[test]
+fn draws_from_before_are_kept() {
+    let text = "fn f(n) { sum(map(fn(i) { sum(map(fn(j) { i * j }, 0 .. 1000)) }, 0 .. n)) }
+        assume k ~ flip(1e-9); assume x ~ normal(0, 1);
+        let s = if k { f(1000000) } else { 0 };
+        observe normal(x + 0 * s, 1) = 0;
+        infer { repeat 1000 { for i in 0 .. 20 { mh(@x); collect x; } gibbs(@k); } }";
+    let model = Model::from_text(text).unwrap_or_else(|e| panic!("{e}"));
+    let options = RunOptions { time: Some(Duration::from_millis(300)), ..RunOptions::default() };
+    let begun = Instant::now();
+    let posterior = model.run(&options, 1, 1).unwrap_or_else(|e| panic!("{e}"));
+    assert!(posterior.chains[0].draws >= 20 && posterior.chains[0].last.log_joint().is_finite());
+    assert!(begun.elapsed() > Duration::from_secs(2), "nothing was given up");
+}
+
+#[test]
+fn kernels_that_call_themselves() {
+    let text = "kernel k(n) { k(n); } assume x ~ normal(0, 1); observe normal(x, 1) = 0; infer { repeat 10 { k(1); } }";
+    let e = Model::from_text(text).and_then(|m| m.run(&RunOptions::default(), 1, 1)).unwrap_err().to_string();
+    assert!(e.contains("more than 200 deep") && e.contains("<program>:1:"), "{e}");
+}
+
+#[test]
+fn starts_that_would_never_be_done() {
+    let text = |n: &str| {
+        format!(
+            "assume x ~ normal(0, 1); observe normal(x, 1) = 0; infer {{ init(best_of({n})); repeat 10 {{ mh(@x); }} }}"
+        )
+    };
+    let options = RunOptions { time: Some(Duration::from_millis(300)), ..RunOptions::default() };
+    for n in ["1e12", "1e300"] {
+        let posterior =
+            Model::from_text(&text(n)).and_then(|m| m.run(&options, 1, 1)).unwrap_or_else(|e| panic!("{e}"));
+        assert!(posterior.chains[0].draws > 0);
+    }
+}
