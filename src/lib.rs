@@ -29,6 +29,7 @@ mod platform;
 pub mod render;
 pub mod report;
 pub mod rng;
+#[doc(hidden)]
 pub mod session;
 #[doc(hidden)]
 pub mod syntax;

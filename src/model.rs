@@ -145,6 +145,7 @@ impl Program {
     ///
     /// # Errors
     /// As [`Program::open`].
+    #[doc(hidden)]
     pub fn named(name: &str, text: &str) -> Result<Program, Error> {
         Program::read(name, text, Reach::of_program(name).unwrap_or_default())
     }
@@ -183,6 +184,7 @@ impl Program {
     }
 
     /// The name of its main file.
+    #[doc(hidden)]
     pub fn name(&self) -> &str {
         &self.name
     }
@@ -193,6 +195,7 @@ impl Program {
     }
 
     /// The `data` items that have no value yet.
+    #[doc(hidden)]
     pub fn missing_data(&self) -> Vec<String> {
         let open = self.interface().data.into_iter().filter(|d| !d.has_default && !self.data.contains_key(&d.name));
         open.map(|d| d.name).collect()
@@ -218,6 +221,7 @@ impl Program {
     }
 
     /// Whether a `param` was set.
+    #[doc(hidden)]
     pub fn is_set(&self, name: &str) -> bool {
         self.sets.iter().any(|(n, _)| n == name)
     }
@@ -293,6 +297,7 @@ impl Program {
 
     /// Says what is to run although nothing asks for it.
     #[must_use]
+    #[doc(hidden)]
     pub fn eager(mut self, eager: Eager) -> Program {
         self.eager = eager;
         self

@@ -187,6 +187,9 @@ fn on_a_terminal() {
     p.send_line(":infer mh(@height) 100000000000 &").unwrap();
     p.exp_string("run 2 in the background").unwrap();
     p.exp_string(prompt).unwrap();
+    p.send_control('d').unwrap();
+    p.exp_string("run 2 would be lost").unwrap();
+    p.exp_string(prompt).unwrap();
     p.send_line("twice(height)").unwrap();
     p.exp_string("\r\n0.5\r\n").unwrap();
     p.exp_string(prompt).unwrap();

@@ -219,7 +219,7 @@ fn inference_in_the_background_leaves_the_state_until_it_is_asked_for() {
     let done = says(&mut s, ":wait");
     assert!(done.contains("400 steps, 400 draws") && done.contains("done"), "{done}");
     assert_eq!(says(&mut s, ":status"), done);
-    assert_eq!(s.is_background_done(), Some(1));
+    assert_eq!(s.background(), Some((1, true)));
     assert_eq!(state(&s), before, "waiting is not taking over");
     let stopped = says(&mut s, ":stop");
     assert!(stopped.starts_with("run 1 is the state now") && stopped.contains("accepted"), "{stopped}");
@@ -337,6 +337,9 @@ fn huge_values_are_no_trouble() {
     assert!(says(&mut s, "h").chars().count() < 2100);
     let before = state(&s);
     refuses(&mut s, "fn f(n) { a ~ normal(0, 1); a + f(n + 1) } let deep = f(0)");
+    assert_eq!(state(&s), before);
+    assert!(refuses(&mut s, "let many = map(fn(i) { i + 1 }, 0 .. 5000000)").contains("grew beyond"));
+    assert!(refuses(&mut s, "let most = 0 .. 1000000000000").contains("too long"));
     assert_eq!(state(&s), before);
     assert!(says(&mut s, "1e300 * 1").contains("1e300"));
 }

@@ -9,6 +9,7 @@ use crate::syntax::span::FileId;
 use crate::syntax::{SyntaxError, parse, parse_expr};
 use std::sync::Arc;
 
+#[doc(hidden)]
 impl Program {
     /// The same program with another text: what it was given stays, and so do the files that it has read.
     ///
@@ -32,7 +33,7 @@ impl Program {
     }
 
     /// The same program with `sample e;` at its end, `e` being the expression of a text of its own: its value is that of the last
-    /// of [`Code::samples`].
+    /// of [`Code::samples`](crate::lang::code::Code::samples).
     ///
     /// # Errors
     /// If the text is no expression.
@@ -100,6 +101,7 @@ impl Program {
     }
 }
 
+#[doc(hidden)]
 impl Model {
     /// The names of its inference blocks that have one.
     pub fn plan_names(&self) -> impl Iterator<Item = &str> {

@@ -64,7 +64,7 @@ impl Session {
         if let Some(start) = open_string(before) {
             let is_program = before[..start - 1].trim_end().ends_with("include");
             let reads = |name: &&str| before[..start - 1].trim_end().trim_end_matches('(').ends_with(*name);
-            return match is_program || READERS.iter().any(|name| reads(name)) {
+            return match is_program || READERS.iter().any(reads) {
                 true => {
                     found(start, &before[start..], files(&before[start..], if is_program { &[".pcad"] } else { &[] }))
                 }

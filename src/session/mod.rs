@@ -42,10 +42,13 @@ const INPUT: &str = "<input>";
 const NAME: &str = "<session>";
 /// How often choices are drawn anew where they lead to no value, or to one of probability zero.
 const ATTEMPTS: u64 = 20;
-/// Nodes that the trace may have: a slip of the pen should not take the machine's memory.
-const NODES: u32 = 20_000_000;
+/// Nodes that the trace may have, about a gigabyte of them: a slip of the pen should not take the machine's memory.
+const NODES: u32 = 4_000_000;
 /// Choices that may be remembered for `:undo`, over all that can be undone.
 const REMEMBERED: usize = 4_000_000;
+
+/// Who is shown how inference comes along.
+type Watcher = Box<dyn FnMut(&Status)>;
 
 /// A session.
 pub struct Session {
@@ -61,7 +64,7 @@ pub struct Session {
     chains: u32,
     background: Option<Background>,
     last: Option<Finished>,
-    watch: Option<Box<dyn FnMut(&Status)>>,
+    watch: Option<Watcher>,
 }
 
 /// What `:undo` goes back to. Choices are enough to make a trace again, to the last bit.

@@ -285,9 +285,9 @@ impl Session {
         self.background.take().ok_or_else(|| Trouble::plain("nothing runs in the background").hint(":infer &"))
     }
 
-    /// The number of the run in the background, once that is over and has not been told yet: for a front end to say so.
-    pub fn is_background_done(&self) -> Option<u32> {
-        self.background.as_ref().filter(|b| b.status().is_done).map(|b| b.number)
+    /// The number of the run in the background, and whether it is over: for a front end to say so.
+    pub fn background(&self) -> Option<(u32, bool)> {
+        self.background.as_ref().map(|b| (b.number, b.status().is_done))
     }
 
     /// The draws of the run in the background, or of the last one.

@@ -32,6 +32,7 @@ mod twin;
 
 pub use crate::lang::address::{Address, AddressSegment, AddressTextError};
 pub use choices::{Selection, Target};
+#[doc(hidden)]
 pub use explain::{Effect, Reach, Reached, Term};
 pub use limits::{Limits, Stop};
 pub use observed::{Observation, Replicate};
@@ -500,6 +501,7 @@ impl Trace {
     }
 
     /// Sets other bounds on what updates may build.
+    #[doc(hidden)]
     pub fn set_limits(&mut self, limits: Limits) {
         self.graph.limits = limits;
     }

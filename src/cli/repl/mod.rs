@@ -124,24 +124,38 @@ impl Front {
             shown.set(true);
         });
         println!("pcadlang {}: :help lists the commands, Tab completes, Ctrl-D leaves", env!("CARGO_PKG_VERSION"));
-        let mut told = None;
+        let (mut told, mut warned) = (None, None);
         loop {
-            let done = self.session.borrow().is_background_done();
-            if done.is_some() && done != told {
-                println!("run {} is done: `:stop` takes over its state", done.unwrap_or_default());
-                told = done;
+            let background = self.session.borrow().background();
+            if let Some((number, true)) = background
+                && told != Some(number)
+            {
+                println!("run {number} is done: `:stop` takes over its state");
+                told = Some(number);
             }
-            match lines.next(PROMPT).map_err(wrong)? {
+            let leaves = match lines.next(PROMPT).map_err(wrong)? {
                 Typed::Entry(text) => match self.enter(&text) {
-                    Ok(true) => return Ok(()),
-                    Ok(false) => {}
-                    Err(Failure::Interrupted) => eprintln!("{}", Trouble::Stopped),
+                    Ok(leaves) => leaves,
+                    Err(Failure::Interrupted) => {
+                        eprintln!("{}", Trouble::Stopped);
+                        false
+                    }
                     Err(failure) => {
                         term::fail(failure);
+                        false
                     }
                 },
-                Typed::Cleared => {}
-                Typed::End => return Ok(()),
+                Typed::Cleared => false,
+                Typed::End => true,
+            };
+            let background = self.session.borrow().background().map(|(number, _)| number);
+            match background.filter(|_| leaves && warned != background) {
+                Some(number) => {
+                    println!("run {number} would be lost: `:stop` takes over its state; once more leaves");
+                    warned = background;
+                }
+                None if leaves => return Ok(()),
+                None => {}
             }
         }
     }
