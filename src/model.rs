@@ -73,11 +73,13 @@ impl Model {
     }
 
     /// What it may read while it runs.
+    #[doc(hidden)]
     pub fn reach(&self) -> &Reach {
         &self.reach
     }
 
     /// Bounds on what it may build when it is not run but looked at.
+    #[doc(hidden)]
     pub fn limits(&self) -> &Limits {
         &self.limits
     }
