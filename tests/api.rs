@@ -28,7 +28,7 @@ const PROMISED: &[(&str, &[&str], &[&str])] = &[
     ("src/trace/choices.rs", &["Target", "Selection"], &["src/trace"]),
     ("src/trace/propose.rs", &["Change", "Constraint", "Draws", "Weight"], &["src/trace"]),
     ("src/trace/select.rs", &["Selector", "ChoiceKind", "Pattern", "PatternSegment"], &["src/trace"]),
-    ("src/trace/graph.rs", &["Limits"], &["src/trace"]),
+    ("src/trace/limits.rs", &["Limits"], &["src/trace", "src/guide.md"]),
     ("src/lang/address.rs", &["Address", "AddressSegment"], &["src/trace"]),
     ("src/infer/kernel.rs", &["At", "Kernel", "Outcome", "Pick", "Scope", "decide", "recoverable"], &["src/infer"]),
     ("src/infer/observer.rs", &[], &["src/infer"]),

@@ -49,7 +49,7 @@ fn modules_depend_one_way() {
             "session",
             &[
                 "session", "bank", "Model", "model", "report", "infer", "trace", "lang", "syntax", "diag", "geom",
-                "render", "rng",
+                "platform", "render", "rng",
             ],
         ),
         ("bank", &["bank", "Model", "report", "infer", "trace", "lang", "dist", "render", "vision", "num", "rng"]),

@@ -21,7 +21,7 @@ use serde_json::json;
 
 type Target = fn(&[u8]);
 
-const TARGETS: [(&str, Target); 12] = [
+const TARGETS: [(&str, Target); 13] = [
     ("program_text", targets::program_text),
     ("program", targets::program),
     ("obj", targets::obj),
@@ -32,6 +32,7 @@ const TARGETS: [(&str, Target); 12] = [
     ("camera", targets::camera),
     ("trace", targets::trace),
     ("bank", targets::bank),
+    ("checkpoint", targets::checkpoint),
     ("keypoints", targets::keypoints),
     ("table", targets::table),
 ];
@@ -186,6 +187,7 @@ fn seeds_of(target: &str) -> Vec<Vec<u8>> {
             (0..5).map(|i| serde_json::to_vec(&model.simulate(i, 0).unwrap().save(model.hash())).unwrap()).collect()
         }
         "bank" => vec![a_bank()],
+        "checkpoint" => targets::checkpoints(None).into_iter().step_by(9).collect(),
         "keypoints" => people(),
         "table" => texts(&[
             "\0{\"a\": [1, 2, {\"b\": null}], \"c\": \"x\"}",
@@ -246,6 +248,7 @@ fn seeds() {
                 "array" => depth::decode(seed, 1.0, &Limits::default()).is_ok(),
                 "camera" => Camera::from_json(text()).is_ok(),
                 "keypoints" => People::parse(seed).is_ok(),
+                "checkpoint" => pcadlang::infer::Checkpoint::from_bytes(seed).is_ok(),
                 _ => true,
             };
             assert!(good, "a seed of {name} is refused: {}", String::from_utf8_lossy(seed));

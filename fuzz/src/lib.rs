@@ -5,16 +5,21 @@
 use pcadlang::bank::Bank;
 use pcadlang::diag::{IntoDiagnostic, SourceMap, render};
 use pcadlang::geom::{FileFrame, UpAxis, gltf as gltf_file, obj as obj_file};
+use pcadlang::infer::draws::{Column, DrawRow, Sink};
+use pcadlang::infer::{Checkpoint, Progress};
 use pcadlang::lang::builtins::data::{Options, load};
 use pcadlang::num::fnv1a;
 use pcadlang::render::Camera;
+use pcadlang::report::checkpoint::SavedChain;
 use pcadlang::syntax::{parse, print, span::FileId};
 use pcadlang::trace::{Limits, SavedTrace, Trace};
 use pcadlang::vision::features::Query;
 use pcadlang::vision::keypoints::People;
 use pcadlang::vision::{Limits as Pixels, depth, mask, npy, photo};
 use pcadlang::{Model, Program, RunOptions};
-use std::sync::{Arc, OnceLock};
+use std::io;
+use std::sync::atomic::Ordering;
+use std::sync::{Arc, Mutex, OnceLock, PoisonError};
 use std::time::Duration;
 
 /// Pictures of a size that many can be tried of in a second.
@@ -186,6 +191,95 @@ pub fn trace(bytes: &[u8]) {
     saved.program = traced().hash().to_owned();
     saved.version = 1;
     reload(traced(), &saved);
+}
+
+/// The program whose chains go on from checkpoints: kernels that remember much, statements within statements.
+const BROKEN_OFF: &str = "
+assume m ~ normal(0, 5); assume s ~ half_normal(2); assume c ~ flip(0.5);
+assume d = if c { e ~ normal(0, 1); e } else { 0 };
+for i in 0 .. 3 { z[i] ~ flip(0.5); observe normal(m + d + (if z[i] { 2 } else { 0 }), s) = i as y; }
+kernel both(n) { drift(@m, n); mh(one(@**)); }
+infer {
+    init(best_of(3, keep = 2));
+    warmup 6 { anneal(10); drift(@m + @s); slice(@s); }
+    for w in [0.1, 1] {
+        repeat 4 {
+            let t = w + abs(m);
+            mix { 1 => nuts(@m + @s, max_depth = 2); 1 => temper(drift(@m), levels = 2); 1 => both(t); }
+            gibbs(each(@z)); collect m, z;
+        }
+    }
+}";
+
+/// The program of [`checkpoint`], compiled once.
+///
+/// # Panics
+/// If it does not compile.
+pub fn broken_off() -> &'static Model {
+    static MODEL: OnceLock<Model> = OnceLock::new();
+    MODEL.get_or_init(|| Model::from_text(BROKEN_OFF).unwrap_or_else(|e| panic!("{e}")))
+}
+
+/// Goes on from a checkpoint, and keeps those that are made.
+struct GoingOn {
+    from: Option<Checkpoint>,
+    kept: Arc<Mutex<Vec<Vec<u8>>>>,
+    progress: Arc<Progress>,
+}
+
+impl Sink for GoingOn {
+    fn columns(&mut self, _: &[Column]) -> io::Result<()> {
+        Ok(())
+    }
+
+    fn draw(&mut self, _: &DrawRow) -> io::Result<()> {
+        Ok(())
+    }
+
+    fn chain_done(&mut self, _: u32, _: u64, _: u64, _: f64) -> io::Result<()> {
+        Ok(())
+    }
+
+    fn resume(&mut self) -> io::Result<Option<Checkpoint>> {
+        Ok(self.from.take())
+    }
+
+    fn takes_checkpoints(&self) -> bool {
+        true
+    }
+
+    fn checkpoint(&mut self, checkpoint: &Checkpoint) -> io::Result<()> {
+        self.kept.lock().unwrap_or_else(PoisonError::into_inner).push(checkpoint.to_bytes());
+        self.progress.checkpoints.fetch_add(1, Ordering::Relaxed);
+        Ok(())
+    }
+}
+
+/// The checkpoints of a chain at each of its steps.
+pub fn checkpoints(from: Option<Checkpoint>) -> Vec<Vec<u8>> {
+    let (kept, progress) = (Arc::<Mutex<Vec<_>>>::default(), Arc::new(Progress::default()));
+    progress.checkpoints.store(1, Ordering::Relaxed);
+    let sink = GoingOn { from, kept: Arc::clone(&kept), progress: Arc::clone(&progress) };
+    let time = Some(Duration::from_millis(300));
+    let options = RunOptions { seed: 1, time, limits: small(), ..RunOptions::default() };
+    match broken_off().run_into(&options, 1, &progress, vec![Box::new(sink)]) {
+        Ok(mut done) => {
+            if let Some(Ok(chain)) = done.pop() {
+                assert!(!chain.last.log_joint().is_nan());
+            }
+        }
+        Err(e) => assert!(!e.to_string().is_empty()),
+    }
+    let kept = std::mem::take(&mut *kept.lock().unwrap_or_else(PoisonError::into_inner));
+    kept
+}
+
+/// What is inside of the file of a checkpoint, as of a run of ours; and any file as one.
+pub fn checkpoint(bytes: &[u8]) {
+    let _ = SavedChain::read(bytes, "");
+    if let Ok(checkpoint) = Checkpoint::from_bytes(bytes) {
+        checkpoints(Some(checkpoint));
+    }
 }
 
 /// A bank: its header, every kind of entry, and a search. The hash of the header is put right, or nothing would get past it.

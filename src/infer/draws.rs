@@ -193,10 +193,11 @@ impl KernelStats {
     /// Adds what a step did, and the time it took.
     #[doc(hidden)]
     pub fn add(&mut self, outcome: &super::Outcome, time: std::time::Duration) {
-        self.proposals += u64::from(outcome.proposals);
-        self.accepted += u64::from(outcome.accepted);
-        self.failed += u64::from(outcome.failed);
-        self.divergent += u64::from(outcome.divergent);
+        let add = |a: &mut u64, b: u32| *a = a.saturating_add(b.into());
+        add(&mut self.proposals, outcome.proposals);
+        add(&mut self.accepted, outcome.accepted);
+        add(&mut self.failed, outcome.failed);
+        add(&mut self.divergent, outcome.divergent);
         self.seconds += time.as_secs_f64();
     }
 

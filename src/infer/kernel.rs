@@ -80,10 +80,11 @@ impl Outcome {
 
     /// Adds what another step did.
     pub fn add(&mut self, other: Outcome) {
-        self.proposals += other.proposals;
-        self.accepted += other.accepted;
-        self.failed += other.failed;
-        self.divergent += other.divergent;
+        let add = |a: &mut u32, b: u32| *a = a.saturating_add(b);
+        add(&mut self.proposals, other.proposals);
+        add(&mut self.accepted, other.accepted);
+        add(&mut self.failed, other.failed);
+        add(&mut self.divergent, other.divergent);
     }
 
     /// The same, about one choice.

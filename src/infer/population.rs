@@ -38,7 +38,7 @@ impl Population {
 
     /// Whether it is one that can be gone on with; what was read may not be.
     pub fn fits(&self) -> bool {
-        self.members.is_empty() || self.turn < self.members.len()
+        (self.members.is_empty() || self.turn < self.members.len()) && self.steps < 1 << 60
     }
 
     /// Called after each step of the annealing, with the share of it that is done and the power that belongs to it. Gives the

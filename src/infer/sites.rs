@@ -22,8 +22,8 @@ impl Sites {
         }
         let new = || SiteStats { address: trace.address(t).to_string(), ..Default::default() };
         let site = self.0.entry(hash).or_insert_with(new);
-        site.proposals += u64::from(outcome.proposals);
-        site.accepted += u64::from(outcome.accepted);
+        site.proposals = site.proposals.saturating_add(outcome.proposals.into());
+        site.accepted = site.accepted.saturating_add(outcome.accepted.into());
     }
 
     /// The counts, for a checkpoint.

@@ -92,6 +92,7 @@ pub trait Object: Any + fmt::Debug + Send + Sync {
         None
     }
     /// About how many numbers it holds that nothing else does, where they are many.
+    #[doc(hidden)]
     fn own_numbers(&self) -> usize {
         0
     }

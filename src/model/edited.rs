@@ -1,7 +1,8 @@
 //! Programs made from programs: another text, more at the end, a question; and the plans of a model by name. For whoever writes a
 //! program bit by bit.
 
-use super::{Error, Files, Model, Program};
+use super::program::Files;
+use super::{Error, Model, Program};
 use crate::diag::IntoDiagnostic;
 use crate::lang::reach::Reach;
 use crate::syntax::ast::{Item, ItemKind, KStmt, Stmt, StmtKind};

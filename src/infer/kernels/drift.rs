@@ -205,7 +205,10 @@ impl Kernel for Drift {
         let (mut dimensions, mut dimensions_before) = (0, 0);
         let frees: Vec<_> = targets.iter().map(|t| trace.free(*t)).collect();
         let shape = joint.then(|| shape_key(trace, &targets, &frees));
+        let dimension: usize = frees.iter().flatten().map(|(y, _)| y.len()).sum();
         let along = shape.and_then(|k| self.shapes.get(&k)).and_then(|s| s.step(&mut rng));
+        // A shape of another size can only be one that was read.
+        let along = along.filter(|a| a.len() == dimension);
         // Of uneven length, independent of the state.
         let length = if along.is_some() { libm::exp(0.5 * rng.standard_normal()) } else { 1.0 };
         for (t, free) in targets.iter().zip(frees) {

@@ -111,7 +111,7 @@ impl<W: Way> Independent<W> {
     fn decide(&mut self, trace: &mut Trace, mut particles: Vec<Trace>, log_evidence: f64, rng: &mut Stream) -> Outcome {
         let one = rng.index(particles.len());
         let (count, log_sum) = self.estimates;
-        self.estimates = (count + 1, log_sum_exp(&[log_sum, log_evidence]));
+        self.estimates = (count.saturating_add(1), log_sum_exp(&[log_sum, log_evidence]));
         let ratio = match self.accepted {
             Some((_, old)) => log_evidence - old,
             // The first state is a start like any other.

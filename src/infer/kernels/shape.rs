@@ -37,7 +37,7 @@ impl Shape {
 
     /// Learns from a state.
     pub fn add(&mut self, y: &[f64]) {
-        self.count += 1;
+        self.count = self.count.saturating_add(1);
         let n = f64::from(self.count);
         let before: Vec<f64> = y.iter().zip(&self.mean).map(|(y, m)| y - m).collect();
         self.mean.iter_mut().zip(&before).for_each(|(m, d)| *m += d / n);

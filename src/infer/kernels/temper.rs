@@ -106,7 +106,7 @@ impl Kernel for Temper {
                 self.adapt(pair, if ratio.is_nan() { 0.0 } else { libm::exp(ratio.min(0.0)) });
             }
         }
-        self.rounds += 1;
+        self.rounds = self.rounds.wrapping_add(1);
         Ok(outcome)
     }
 }

@@ -20,6 +20,11 @@ use std::time::Duration;
 
 type State = Vec<(u64, Constraint)>;
 
+/// No chain gets so far.
+const MOST: u64 = 1 << 60;
+/// The most numbers that are recorded with a draw.
+const MOST_NUMBERS: usize = 10_000_000;
+
 /// The state of a chain at a step, and all it needs to go on. Of use with the same program, plan, data and seed only; what keeps it
 /// sees to that.
 #[derive(Clone, Debug, PartialEq, Serialize, Deserialize)]
@@ -107,7 +112,10 @@ impl Checkpoint {
     /// If they are others.
     pub fn from_bytes(bytes: &[u8]) -> Result<Checkpoint, StateError> {
         let c: Checkpoint = unpack(bytes)?;
-        holds(c.warmup_steps <= c.step && c.population.fits(), "a chain")?;
+        let sizes = c.columns.iter().try_fold(0usize, |sum, column| sum.checked_add(column.shape.len()));
+        let counts = [c.step, c.draws].into_iter().chain(c.path.iter().map(Place::most));
+        let fits = c.warmup_steps <= c.step && c.population.fits() && sizes.is_some_and(|n| n <= MOST_NUMBERS);
+        holds(fits && counts.into_iter().all(|n| n < MOST), "a chain")?;
         Ok(c)
     }
 

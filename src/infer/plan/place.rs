@@ -16,6 +16,17 @@ pub(super) struct Place {
     pub doing: Doing,
 }
 
+impl Place {
+    /// The largest of its counts.
+    pub fn most(&self) -> u64 {
+        match &self.doing {
+            Doing::Loop { pass, of, first } => (*pass).max(*of).max(*first),
+            Doing::Kernel { steps, .. } => *steps as u64,
+            _ => 0,
+        }
+    }
+}
+
 /// How far a statement is.
 #[derive(Clone, Debug, Default, PartialEq, Serialize, Deserialize)]
 pub(super) enum Doing {

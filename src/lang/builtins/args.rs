@@ -175,6 +175,7 @@ impl<'a> Args<'a> {
     }
 
     /// The error that a distribution has too much in it.
+    #[doc(hidden)]
     pub fn too_large(&self, what: &str, most: usize) -> Fault {
         Fault::new(FaultKind::Limit, format!("{}: more than {most} {what}", self.builtin.full_name()))
     }

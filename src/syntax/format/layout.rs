@@ -23,7 +23,7 @@ pub(super) enum Rule {
 pub(super) enum Kind {
     /// A list in brackets: broken if the source has a line end behind the bracket.
     Brackets,
-    /// A block of statements: likewise; those around it are broken with it.
+    /// A block of statements: likewise, or if all of it, on one line, would be too long; those around it are broken with it.
     Block,
     /// Parts that may go on in new lines: broken if all of it, on one line, would be too long.
     Parts,
@@ -183,7 +183,7 @@ impl Setter<'_, '_> {
             }
             Op::Blank if self.breaks == 1 || self.comment.is_some() => self.breaks = 2,
             Op::Blank => {}
-            Op::Open { broken, kind } => self.groups.push(*broken || !self.fits(i, 0, *kind == Kind::Parts)),
+            Op::Open { broken, kind } => self.groups.push(*broken || !self.fits(i, 0, *kind != Kind::Brackets)),
             Op::Close => drop(self.groups.pop()),
             Op::Indent => self.indents.push(self.is_broken()),
             Op::Dedent => drop(self.indents.pop()),

@@ -100,7 +100,7 @@ impl<'s> Printer<'s> {
 
     /// Whether the source has a line end behind the bracket that was just written.
     fn opened(&self) -> bool {
-        self.source.as_ref().is_some_and(Source::opened)
+        self.source.as_ref().is_some_and(Source::ended_line)
     }
 
     pub fn line(&mut self, flat: &'static str, rule: Rule) {
@@ -136,7 +136,7 @@ impl<'s> Printer<'s> {
     /// What comes next may be lined up with lines above and below.
     pub fn stop(&mut self) {
         self.flush();
-        if let Some(source) = &self.source {
+        if let Some(source) = self.source.as_ref().filter(|source| !source.has_comments()) {
             self.layout.stop(source.seen());
         }
     }
@@ -183,6 +183,9 @@ impl<'s> Printer<'s> {
             [only] if share == Share::Brackets && !remarks => {
                 print(self, only);
                 self.skip_comma();
+                // Without the comma there is nothing to be below of.
+                let below = self.behind.iter_mut().filter(|comment| comment.place == Place::Below);
+                below.for_each(|comment| comment.place = Place::OwnLine);
                 return self.text(close);
             }
             _ => {}
@@ -193,7 +196,7 @@ impl<'s> Printer<'s> {
         self.flush();
         self.layout.indent();
         for (i, item) in items.iter().enumerate() {
-            let starts_line = opened && self.source.as_ref().is_some_and(Source::starts_line);
+            let starts_line = opened && self.source.as_ref().is_some_and(Source::ended_line);
             let rule = match share {
                 Share::Lines if i > 0 && starts_line => Rule::Kept,
                 Share::Lines if i > 0 => Rule::Fill,

@@ -86,8 +86,8 @@ impl<'s> Source<'s> {
         self.comments.first().map_or(self.blank, |comment| comment.blank)
     }
 
-    /// Whether the bracket that was just passed ends its line.
-    pub fn opened(&self) -> bool {
+    /// Whether the token that was just passed ends its line.
+    pub fn ended_line(&self) -> bool {
         self.gap(self.next).trim_start_matches([' ', '\t']).starts_with('\n')
     }
 
@@ -100,11 +100,6 @@ impl<'s> Source<'s> {
     pub fn opened_at(&self, byte: u32) -> bool {
         let behind = self.text.get(byte as usize + 1..).unwrap_or("");
         behind.trim_start_matches([' ', '\t']).starts_with('\n')
-    }
-
-    /// Whether the next token starts a line.
-    pub fn starts_line(&self) -> bool {
-        self.gap(self.next).contains('\n')
     }
 
     /// Where the next token stands.
@@ -136,6 +131,9 @@ impl<'s> Source<'s> {
         // How many lines end before the next comment.
         let mut ends = usize::from(first);
         let mut own_line = Vec::new();
+        // Behind less than a whole statement or item, a comment may stand where those on lines of their own do.
+        let last_token = self.next.checked_sub(1).and_then(|last| self.tokens.get(last));
+        let ends_part = last_token.is_some_and(|token| matches!(&self.text[token.clone()], "," | ";"));
         while let Some(rest) = gap.get(at..).filter(|rest| !rest.is_empty()) {
             let length = if rest.starts_with("//") {
                 rest.find('\n').unwrap_or(rest.len())
@@ -150,7 +148,8 @@ impl<'s> Source<'s> {
             let seen = self.place(base + at);
             own_line.push(ends);
             let continues = comments.last().is_some_and(|above: &Comment<'_>| {
-                matches!(above.place, Place::Trailing | Place::Below)
+                ends_part
+                    && matches!(above.place, Place::Trailing | Place::Below)
                     && (seen.line, seen.column) == (above.seen.line + 1, above.seen.column)
                     && !above.text.contains('\n')
             });

@@ -110,7 +110,7 @@ impl Adaptation {
         let log_averaged = share * log_step + (1.0 - share) * libm::log(self.averaged.max(f64::MIN_POSITIVE));
         self.step = libm::exp(log_step.clamp(-30.0, 10.0));
         self.averaged = if self.rounds == 1.0 { self.step } else { libm::exp(log_averaged.clamp(-30.0, 10.0)) };
-        self.seen += 1;
+        self.seen = self.seen.saturating_add(1);
         if self.seen > BURN {
             self.count += 1.0;
             for ((m, s), y) in self.mean.iter_mut().zip(&mut self.square).zip(y) {
@@ -126,8 +126,8 @@ impl Adaptation {
                 *m = (n / (n + 5.0)) * (s / (n - 1.0)) + 1e-3 * 5.0 / (n + 5.0);
             }
             self.forget();
-            self.window *= 2;
-            self.window_end = self.seen + self.window;
+            self.window = self.window.saturating_mul(2);
+            self.window_end = self.seen.saturating_add(self.window);
             // The step is learnt anew for the new metric, from about where it was.
             self.mean_log = libm::log(10.0 * self.averaged);
             (self.bias, self.rounds) = (0.0, 0.0);

@@ -150,7 +150,7 @@ impl Memory {
 
     /// The next try comes later, and ever later.
     fn back_off(&mut self) {
-        self.waited = (2 * self.waited).clamp(1, LONGEST);
+        self.waited = self.waited.saturating_mul(2).clamp(1, LONGEST);
         self.wait = self.waited;
     }
 
