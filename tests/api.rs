@@ -7,6 +7,8 @@ use std::path::Path;
 /// are besides.
 const PROMISED: &[(&str, &[&str], &[&str])] = &[
     ("src/model.rs", &[], &["src/guide.md", "src/host"]),
+    ("src/model/program.rs", &[], &["src/guide.md", "src/host"]),
+    ("src/model/error.rs", &[], &["src/guide.md", "src/host"]),
     ("src/host/mod.rs", &[], &["src/host"]),
     ("src/host/entry.rs", &[], &["src/host"]),
     ("src/host/previous.rs", &[], &["src/host"]),

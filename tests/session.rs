@@ -456,8 +456,9 @@ fn files_are_read_once() {
     std::fs::create_dir_all(&folder).unwrap();
     let path = folder.join("d.csv");
     std::fs::write(&path, "y\n1\n2\n").unwrap();
-    let mut s = Session::new(1, Stop::default()).unwrap();
-    says(&mut s, &format!("data d = csv(\"{}\")", path.display()));
+    let program = Program::named(folder.join("session.pcad").to_str().unwrap(), "").unwrap();
+    let mut s = Session::open(program, 1, Stop::default()).unwrap_or_else(|e| panic!("{e}")).0;
+    says(&mut s, "data d = csv(\"d.csv\")");
     std::fs::remove_dir_all(&folder).unwrap();
     says(&mut s, "observe normal(0, 1) = d.y");
     assert_eq!(says(&mut s, "d.y"), "[1, 2]\n");
