@@ -1,10 +1,12 @@
 //! Programs that would take more memory, stack or time than there is: an error at a place, with what to do about it.
 
 use pcadlang::infer::Progress;
+use pcadlang::lang::value::Value;
 use pcadlang::report::Memory;
-use pcadlang::trace::Limits;
+use pcadlang::trace::{Draws, Limits, Stop};
 use pcadlang::{Model, Program, RunOptions};
-use std::sync::atomic::Ordering;
+use std::sync::Arc;
+use std::sync::atomic::{AtomicBool, Ordering};
 use std::time::{Duration, Instant};
 
 /// The error of one draw of a program.
@@ -136,6 +138,25 @@ fn draws_from_before_are_kept() {
     let posterior = model.run(&options, 1, 1).unwrap_or_else(|e| panic!("{e}"));
     assert!(posterior.chains[0].draws >= 20 && posterior.chains[0].last.log_joint().is_finite());
     assert!(begun.elapsed() > Duration::from_secs(2), "nothing was given up");
+}
+
+/// A host has a flag of its own, which ends a run as well; what is left can be looked at although the flag is still set.
+#[test]
+fn a_host_may_stop_evaluations_by_a_flag_of_its_own() {
+    let text = "fn f(n) { sum(map(fn(i) { sum(map(fn(j) { i * j }, 0 .. 1000)) }, 0 .. n)) }
+        assume x ~ normal(0, 1); observe normal(x, 1) = 0; let large = f(20);
+        infer { repeat 1000000000 { mh(@x); collect x; } }";
+    let flag = Arc::new(AtomicBool::new(false));
+    let stop = Stop::when(Arc::clone(&flag)).after(Duration::ZERO);
+    let options = RunOptions { limits: Limits { stop, ..Limits::default() }, ..RunOptions::default() };
+    std::thread::spawn(move || {
+        std::thread::sleep(Duration::from_millis(200));
+        flag.store(true, Ordering::Relaxed);
+    });
+    let posterior = Model::from_text(text).and_then(|m| m.run(&options, 1, 1)).unwrap_or_else(|e| panic!("{e}"));
+    assert!(posterior.chains[0].draws > 0);
+    let large = posterior.chains[0].last.clone().global("large", Draws::default());
+    assert!(matches!(large, Some(Ok(Value::Num(x))) if x > 0.0), "{large:?}");
 }
 
 #[test]

@@ -178,6 +178,14 @@ fn the_library_does_the_same() {
     f.write("own/p.pcad", "data t = csv(\"../other/x.csv\");");
     assert!(Program::open(path).and_then(Program::compile).map_err(why).unwrap_err().contains(OUTSIDE));
     assert!(Program::open(path).and_then(|p| p.allow_read(&other)).and_then(Program::compile).is_ok());
+    // What was allowed stays allowed when the program is edited, and when another takes its place.
+    let wider = Program::open_allowing(path, &[&other]).unwrap();
+    assert!(wider.edited("include \"../other/part.pcad\" as part;").is_ok());
+    f.write("own/parts/q.pcad", "include \"../../other/part.pcad\" as part;").write("own/shared.pcad", "let x = 1;");
+    let next = f.path().join("own/parts/q.pcad");
+    let next = next.to_str().unwrap();
+    assert!(wider.replaced(next).is_ok() && Program::open(path).unwrap().replaced(next).is_err());
+    assert!(wider.written_as(next).is_ok());
     // A program that is only text reads nothing, and observes what it is given.
     let text = format!("data t = csv(\"{}\"); assume x ~ normal(0, 1);", other.join("x.csv").display());
     assert!(Program::parse(&text).and_then(Program::compile).map_err(why).unwrap_err().contains(OUTSIDE));

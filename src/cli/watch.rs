@@ -61,7 +61,7 @@ impl Seen {
         // What the text was read before is seen: a change that comes while it is checked counts.
         let mut seen = BTreeMap::new();
         for program in programs {
-            let own = Reach::of_program(program).unwrap_or_default();
+            let own = Reach::default().of(program);
             let reach = folders.iter().fold(own, |reach, f| reach.clone().allow(f).unwrap_or(reach));
             let asked = Asked { reach, seen: Mutex::new(seen) };
             let _ = load(program, &asked, &mut SourceMap::new());

@@ -9,10 +9,12 @@ use std::path::{Path, PathBuf};
 /// The folders and files that a program may read; by default none.
 #[derive(Clone, Debug, Default)]
 pub struct Reach {
-    /// Without links and `..`.
+    /// The program's own folder, like the others without links and `..`.
+    own: Option<PathBuf>,
+    /// The program's file as it was named, and without links.
+    program: Option<(PathBuf, PathBuf)>,
+    /// What it may read besides.
     folders: Vec<PathBuf>,
-    /// As they were named, and without links and `..`.
-    files: Vec<(PathBuf, PathBuf)>,
 }
 
 /// A file that is there, or would be, where a program may not read.
@@ -42,17 +44,14 @@ impl Outside {
 }
 
 impl Reach {
-    /// That of a program in a file: the file, wherever it may lie in truth, and all below its folder.
-    ///
-    /// # Errors
-    /// If the folder cannot be read.
-    pub fn of_program(path: &str) -> io::Result<Reach> {
-        let path = Path::new(path);
-        let mut reach = Reach::default().allow(folder_of(path))?;
-        if let Ok(real) = path.canonicalize() {
-            reach.files.push((path.to_owned(), real));
-        }
-        Ok(reach)
+    /// That of another program with the same folders besides: its file, wherever it may lie in truth, and all below its folder. Where
+    /// there is no such folder, there is nothing to read.
+    #[must_use]
+    pub fn of(&self, program: &str) -> Reach {
+        let path = Path::new(program);
+        let own = folder_of(path).canonicalize().ok();
+        let program = path.canonicalize().ok().map(|real| (path.to_owned(), real));
+        Reach { own, program, folders: self.folders.clone() }
     }
 
     /// The same, and all below a folder.
@@ -76,7 +75,7 @@ impl Reach {
         let outside = |folder: &Path| Err(io::Error::other(Outside { folder: folder.to_owned() }));
         match path.canonicalize() {
             Ok(real) => {
-                let named = self.files.iter().any(|(name, file)| name == path && *file == real);
+                let named = self.program.as_ref().is_some_and(|(name, file)| name == path && *file == real);
                 if named || self.holds(&real) { Ok(real) } else { outside(folder_of(&real)) }
             }
             Err(e) => match path.ancestors().skip(1).find_map(|p| existing(p).canonicalize().ok()) {
@@ -87,7 +86,7 @@ impl Reach {
     }
 
     fn holds(&self, real: &Path) -> bool {
-        self.folders.iter().any(|f| real.starts_with(f))
+        self.own.iter().chain(&self.folders).any(|f| real.starts_with(f))
     }
 }
 

@@ -4,7 +4,6 @@
 use super::program::Files;
 use super::{Error, Model, Program};
 use crate::diag::IntoDiagnostic;
-use crate::lang::reach::Reach;
 use crate::syntax::ast::{Item, ItemKind, KStmt, Stmt, StmtKind};
 use crate::syntax::span::FileId;
 use crate::syntax::{SyntaxError, parse, parse_expr};
@@ -75,8 +74,7 @@ impl Program {
     /// # Errors
     /// If it would not load from there.
     pub fn written_as(&self, path: &str) -> Result<Program, Error> {
-        let reach = Reach::of_program(path).unwrap_or_default();
-        Program { name: path.to_owned(), reach, ..self.clone() }.edited(&self.text)
+        Program { name: path.to_owned(), reach: self.reach.of(path), ..self.clone() }.edited(&self.text)
     }
 
     /// Another program with what this one was given, as far as it asks for it.
@@ -84,7 +82,7 @@ impl Program {
     /// # Errors
     /// As [`Program::open`].
     pub fn replaced(&self, path: &str) -> Result<Program, Error> {
-        let new = Program::open(path)?;
+        let new = Program::open_within(path, self.reach.of(path))?;
         let interface = new.interface();
         let mut new = Program {
             loaded: new.loaded,

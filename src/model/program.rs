@@ -61,12 +61,15 @@ impl Program {
     /// # Errors
     /// As [`Program::open`], and if one of them is no folder.
     pub fn open_allowing<P: AsRef<Path>>(path: &str, folders: &[P]) -> Result<Program, Error> {
-        let mut sources = SourceMap::new();
-        // A program that is not there has no folder; loading says so.
-        let mut reach = Reach::of_program(path).unwrap_or_default();
+        let mut reach = Reach::default().of(path);
         for folder in folders {
-            reach = widened(reach, folder.as_ref(), &sources)?;
+            reach = widened(reach, folder.as_ref(), &SourceMap::new())?;
         }
+        Program::open_within(path, reach)
+    }
+
+    pub(super) fn open_within(path: &str, reach: Reach) -> Result<Program, Error> {
+        let mut sources = SourceMap::new();
         match load(path, &reach, &mut sources) {
             Ok(loaded) => Ok(Program::new(path, loaded, sources, reach)),
             Err(diagnostics) => Err(Error { diagnostics, sources }),
@@ -87,7 +90,7 @@ impl Program {
     /// As [`Program::open`].
     #[doc(hidden)]
     pub fn named(name: &str, text: &str) -> Result<Program, Error> {
-        Program::read(name, text, Reach::of_program(name).unwrap_or_default())
+        Program::read(name, text, Reach::default().of(name))
     }
 
     pub(super) fn read(name: &str, text: &str, reach: Reach) -> Result<Program, Error> {

@@ -63,7 +63,7 @@ pub(super) fn raise(name: &str) -> String {
 /// itself, so that a state is left in which everything has run.
 #[derive(Clone, Debug, Default)]
 pub struct Stop {
-    asked: Option<Arc<AtomicBool>>,
+    asked: Vec<Arc<AtomicBool>>,
     /// Since when it has how much time.
     time: Option<(Instant, Duration)>,
     patience: Duration,
@@ -71,19 +71,32 @@ pub struct Stop {
 
 /// How long an update may go on after it was asked to stop, where nobody says.
 const PATIENCE: Duration = Duration::from_secs(2);
-/// So many evaluations go by between two looks at the clock, but for the last of them.
+/// So many operations go by between two looks at flags and clock.
 const BETWEEN_LOOKS: u32 = 1 << 12;
+/// What may draw a picture counts as so many of them.
+const LARGE: u32 = 1 << 8;
 
 impl Stop {
     /// Two seconds after this is set.
     pub fn when(asked: Arc<AtomicBool>) -> Stop {
-        Stop { asked: Some(asked), time: None, patience: PATIENCE }
+        Stop { asked: vec![asked], time: None, patience: PATIENCE }
+    }
+
+    /// Also when this is set; what never stops otherwise does so two seconds after.
+    #[must_use]
+    pub fn or(mut self, asked: Arc<AtomicBool>) -> Stop {
+        if self.asked.is_empty() && self.time.is_none() {
+            return Stop::when(asked);
+        }
+        self.asked.push(asked);
+        self
     }
 
     /// Also when so much time has gone by from now on.
     #[must_use]
     pub fn or_within(self, time: Option<Duration>) -> Stop {
-        Stop { time: time.map(|t| (Instant::now(), t)), ..self }
+        let time = time.map(|t| (Instant::now(), t)).or(self.time);
+        Stop { time, ..self }
     }
 
     /// With another time than two seconds in which an update may end by itself.
@@ -94,8 +107,7 @@ impl Stop {
 
     /// Whether it has been asked for, or time is up.
     pub fn is_asked(&self) -> bool {
-        self.asked.as_ref().is_some_and(|a| a.load(Ordering::Relaxed))
-            || self.time.is_some_and(|(from, t)| from.elapsed() >= t)
+        self.asked.iter().any(|a| a.load(Ordering::Relaxed)) || self.time.is_some_and(|(from, t)| from.elapsed() >= t)
     }
 }
 
@@ -114,6 +126,11 @@ impl Spent {
     /// At the beginning of an update.
     pub fn renew(&mut self) {
         (self.operations, self.elements) = (0, 0);
+    }
+
+    /// Notes an operation that may take as long as many.
+    pub fn count_large(&mut self) {
+        self.since_look += LARGE;
     }
 }
 
@@ -157,7 +174,10 @@ impl Graph {
                 self.check_extent(code, n, value)?;
                 value.len().unwrap_or(0)
             }
-            Value::Object(o) => o.own_numbers(),
+            Value::Object(o) => {
+                self.spent.count_large();
+                o.own_numbers()
+            }
             _ => return Ok(()),
         };
         self.spent.elements += made as u64;

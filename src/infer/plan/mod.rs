@@ -18,7 +18,7 @@ use crate::lang::code::Code;
 use crate::lang::error::RunError;
 use crate::platform::clock::Instant;
 use crate::syntax::ast::{Expr, ExprKind, KStmt};
-use crate::trace::{Constraint, Draws, Limits, Stop, Trace};
+use crate::trace::{Constraint, Draws, Limits, Trace};
 use runner::Runner;
 use std::fmt;
 use std::sync::Arc;
@@ -206,9 +206,9 @@ pub fn run_from(
     run_among(code, plan, options, progress, sink, (chain, started), vec![trace])
 }
 
-/// The options of a chain that is heard in the middle of an evaluation when it should end.
+/// The options of a chain that hears in the middle of an evaluation, too, that it should end.
 fn stoppable(options: &RunOptions, progress: &Progress) -> RunOptions {
-    let stop = Stop::when(Arc::clone(&progress.cancelled)).or_within(options.time);
+    let stop = options.limits.stop.clone().or(Arc::clone(&progress.cancelled)).or_within(options.time);
     RunOptions { limits: Limits { stop, ..options.limits.clone() }, ..options.clone() }
 }
 

@@ -18,7 +18,7 @@ use crate::lang::value::{Extent, Value};
 use crate::platform::clock::Instant;
 use crate::rng::{Purpose, StreamKey};
 use crate::syntax::ast::{Expr, KStmt, KStmtKind};
-use crate::trace::{Constraint, Draws, Selector, Trace};
+use crate::trace::{Constraint, Draws, Limits, Selector, Stop, Trace};
 use rustc_hash::FxHashMap;
 use std::collections::VecDeque;
 use std::sync::Arc;
@@ -152,6 +152,8 @@ impl<'a> Runner<'a> {
                 self.keep(None)?;
             }
         }
+        // What looks at the last state afterwards takes its own time.
+        self.trace.set_limits(Limits { stop: Stop::default(), ..self.options.limits.clone() });
         let seconds = self.started.elapsed().as_secs_f64();
         let (steps, warmup) = (self.step - self.warmup_steps, self.warmup_steps);
         self.sink.chain_done(self.chain, steps, warmup, seconds).map_err(ChainError::Sink)?;

@@ -21,6 +21,10 @@ impl Graph {
     ) -> Result<Step, Failure> {
         let frame = self.nodes[n as usize].frame;
         let mut deps = Deps::new();
+        // Of a view, it draws a picture.
+        if matches!(spec, DistSpec::Value(_)) {
+            self.spent.count_large();
+        }
         let score = match self.observation_score(code, n, frame, spec, value, &mut deps) {
             Ok(score) => score?,
             Err(m) => return self.need(code, m),
