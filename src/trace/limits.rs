@@ -105,9 +105,14 @@ impl Stop {
         Stop { patience, ..self }
     }
 
+    /// Whether a flag is set.
+    pub fn is_set(&self) -> bool {
+        self.asked.iter().any(|a| a.load(Ordering::Relaxed))
+    }
+
     /// Whether it has been asked for, or time is up.
     pub fn is_asked(&self) -> bool {
-        self.asked.iter().any(|a| a.load(Ordering::Relaxed)) || self.time.is_some_and(|(from, t)| from.elapsed() >= t)
+        self.is_set() || self.time.is_some_and(|(from, t)| from.elapsed() >= t)
     }
 }
 

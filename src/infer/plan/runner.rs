@@ -364,7 +364,8 @@ impl<'a> Runner<'a> {
     }
 
     pub fn is_cancelled(&self) -> bool {
-        self.progress.cancelled.load(Ordering::Relaxed) || self.options.watch.as_ref().is_some_and(|w| w.is_over())
+        let (stop, watch) = (&self.options.limits.stop, &self.options.watch);
+        self.progress.cancelled.load(Ordering::Relaxed) || stop.is_set() || watch.as_ref().is_some_and(|w| w.is_over())
     }
 
     /// Whether the run, or the warm-up, has used up what it was given.
