@@ -262,7 +262,7 @@ fn seeds_with_bytes_changed() {
         let mut x = 0x9e37_79b9_7f4a_7c15;
         for seed in seeds_of(name) {
             // A chain is run from each checkpoint.
-            for _ in 0..if name == "checkpoint" { 10 } else { 100 } {
+            for _ in 0..if name == "checkpoint" { 10 } else { 30 } {
                 target(&changed(&seed, &mut x));
             }
         }
