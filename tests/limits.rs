@@ -106,7 +106,7 @@ fn an_evaluation_ends_when_time_is_up() {
     let model = Model::from_text(LONG).unwrap();
     let begun = Instant::now();
     let options = RunOptions { time: Some(Duration::from_millis(200)), ..RunOptions::default() };
-    let e = model.run(&options, 1, 1).err().expect("there is no time for it").to_string();
+    let e = model.run(&options, 1, 1).expect_err("there is no time for it").to_string();
     assert!(e.contains("stopped in the middle of an evaluation"), "{e}");
     assert!(begun.elapsed() < Duration::from_secs(60), "{:?}", begun.elapsed());
 }

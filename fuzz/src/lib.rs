@@ -270,8 +270,7 @@ pub fn checkpoints(from: Option<Checkpoint>) -> Vec<Vec<u8>> {
         }
         Err(e) => assert!(!e.to_string().is_empty()),
     }
-    let kept = std::mem::take(&mut *kept.lock().unwrap_or_else(PoisonError::into_inner));
-    kept
+    std::mem::take(&mut *kept.lock().unwrap_or_else(PoisonError::into_inner))
 }
 
 /// What is inside of the file of a checkpoint, as of a run of ours; and any file as one.

@@ -86,7 +86,6 @@ fn run<T>(
         threads: a.threads.map_or_else(machine_threads, |n| n as usize),
         steps: a.steps,
         limits: model.limits().clone(),
-        ..Settings::default()
     };
     let (progress, done) = (Arc::new(Progress::default()), AtomicBool::new(false));
     interrupt.ends(&progress);

@@ -259,7 +259,6 @@ fn fill(
         watch: Some(Arc::new(joints.clone())),
         banks: Some(Arc::new(BankFiles::new(model, folder(&job.given.program), job.features_from.clone()))),
         sites: true,
-        ..RunOptions::default()
     };
     let memories: Vec<Memory> = (0..s.chains).map(|_| Memory::bounded(ROOM / s.chains as usize)).collect();
     let sinks = sinks(dir, job, model, &memories, record, manner.resume)?;
