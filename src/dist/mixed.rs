@@ -20,7 +20,7 @@ struct Mixed {
 }
 
 /// The batch of a mixture whose weights, and the parameters of whose components, lie in these columns or stay. `None` where a
-/// component is no distribution of a number that [`super::batch`] knows.
+/// component is no distribution of a number that `batch` knows.
 pub fn batch_of_mixture(
     dist: &Mixture,
     weights: Option<Column>,

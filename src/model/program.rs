@@ -187,7 +187,7 @@ impl Program {
     }
 
     /// Bounds on what the program may build when it is not run but looked at: one draw, the plan. Runs have their own
-    /// ([`RunOptions::limits`]).
+    /// ([`crate::RunOptions::limits`]).
     #[must_use]
     pub fn limits(self, limits: Limits) -> Program {
         Program { limits, ..self }
