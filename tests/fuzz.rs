@@ -284,7 +284,7 @@ fn findings() {
 #[test]
 #[ignore = "writes files: see fuzz/seeds.sh"]
 fn write_seeds() {
-    let to = PathBuf::from(std::env::var_os("SEEDS").expect("SEEDS names a folder"));
+    let Some(to) = std::env::var_os("SEEDS").map(PathBuf::from) else { return };
     for (name, _) in TARGETS {
         let folder = to.join(name);
         std::fs::create_dir_all(&folder).unwrap();
