@@ -11,7 +11,7 @@ use pcadlang::infer::draws::{KernelStats, Sink, SiteStats};
 use pcadlang::infer::{ChainResult, Progress};
 use pcadlang::report::html::{MeshData, Page, page};
 use pcadlang::report::{
-    ChainDraws, ChainFile, Memory, Mode, Quantity, RunDir, bytes_hash, modes, quantities, seconds, table, text_hash,
+    ChainDraws, ChainFiles, Memory, Mode, Quantity, RunDir, bytes_hash, modes, quantities, seconds, table, text_hash,
 };
 use pcadlang::vision::Photo;
 use pcadlang::{Model, RunOptions};
@@ -343,11 +343,12 @@ fn sinks(
         ("program_hash", model.hash().to_owned()),
         ("seed", job.sampling.seed.to_string()),
     ];
+    let files = ChainFiles { dir, run: &run, comments: &comments };
     let mut sinks: Vec<Box<dyn Sink>> = Vec::new();
     for (i, memory) in memories.iter().enumerate() {
         let chain = match resume {
-            true => ChainFile::resume(dir, i as u32, &run, &comments, memory),
-            false => ChainFile::begin(dir, i as u32, &run, &comments, memory),
+            true => files.resume(i as u32, memory),
+            false => files.begin(i as u32, memory),
         };
         sinks.push(Box::new(chain.map_err(|e| plain(format!("{}: {e}", dir.path().display())))?));
     }

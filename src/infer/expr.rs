@@ -1,7 +1,7 @@
 //! Expressions of inference blocks: counts, weights, conditions. They see the block's own variables, the model's top-level
 //! names, and what is known of the run.
 
-use super::selection::fail;
+use super::selection::{fail, fault};
 use crate::lang::builtins::{Args, Kind};
 use crate::lang::code::{Code, Operand};
 use crate::lang::error::RunError;
@@ -118,18 +118,10 @@ fn builtin(name: &str, values: &[&Value], e: &Expr, env: &Scope) -> Result<Value
     let found = env.code.builtins.find("", name).map(|i| env.code.builtins.get(i));
     match found {
         Some(b) => match b.kind {
-            Kind::Function(f) => f(&Args { builtin: b, values }).map_err(|f| {
-                let mut error = fail(e.span, f.message);
-                error.hint = f.hint;
-                error
-            }),
+            Kind::Function(f) => f(&Args { builtin: b, values }).map_err(|f| fault(e.span, f)),
             Kind::Distribution(_) => match b.distribution(values) {
                 Ok(d) => Ok(Value::Dist(Arc::new(d))),
-                Err(f) => {
-                    let mut error = fail(e.span, f.message);
-                    (error.kind, error.hint) = (f.kind, f.hint);
-                    Err(error)
-                }
+                Err(f) => Err(Box::new(RunError { kind: f.kind, ..*fault(e.span, f) })),
             },
             _ => Err(fail(e.span, format!("`{name}` is not available in this place"))),
         },

@@ -3,8 +3,9 @@
 use super::build::{Built, build, without};
 use super::expr::{Scope as Env, evaluate};
 use super::kernel::{Kernel, Scope};
+use super::plain::Plain;
 use super::plan::RunOptions;
-use super::selection::{fail, scope};
+use super::selection::{fail, fault, scope};
 use crate::lang::builtins::{Args, Builtin, State, Type};
 use crate::lang::error::{Fault, RunError};
 use crate::lang::value::Value;
@@ -89,7 +90,7 @@ pub(super) fn build_foreign(
             }
             (Some(e), _) => {
                 value = evaluate(e, env)?;
-                signature += &format!(" {:?}", value.numbers());
+                signature += &format!(" {:?}", Plain::of(&value));
             }
         }
         values.push(value);
@@ -102,10 +103,5 @@ pub(super) fn build_foreign(
         Some(maker) => (maker.0)(&mut call),
         None => Err(Fault::type_error(format!("`{}` is no kernel", builtin.full_name()))),
     };
-    let kernel = made.map_err(|f| {
-        let mut error = fail(e.span, f.message);
-        error.hint = f.hint;
-        error
-    })?;
-    Ok(Built { kernel, signature })
+    Ok(Built { kernel: made.map_err(|f| fault(e.span, f))?, signature })
 }

@@ -56,3 +56,4 @@ pub use plan::{ChainError, ChainResult, Checkpoint, Progress, RunOptions, Watch}
 #[doc(hidden)]
 pub use selection::selected;
 pub use state::StateError;
+pub(crate) use state::{pack, unpack};

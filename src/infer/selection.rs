@@ -2,7 +2,7 @@
 
 use super::expr::{Scope, evaluate};
 use super::kernel::{self, Pick};
-use crate::lang::error::{FaultKind, RunError};
+use crate::lang::error::{Fault, FaultKind, RunError};
 use crate::lang::key::Key;
 use crate::syntax::ast::{self, BinaryOp, Expr, ExprKind, SegmentName};
 use crate::syntax::span::Span;
@@ -139,6 +139,11 @@ fn not_a_selection(span: Span) -> Box<RunError> {
     let mut e = fail(span, "expected a selection of choices".into());
     e.hint = Some("an address such as @**, a tag such as $affine, or both joined by +, - or &".into());
     e
+}
+
+/// The error of a built-in at a place of a plan.
+pub(super) fn fault(span: Span, f: Fault) -> Box<RunError> {
+    Box::new(RunError { hint: f.hint, ..*fail(span, f.message) })
 }
 
 /// An error in an inference block.

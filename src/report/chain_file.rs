@@ -22,6 +22,16 @@ pub struct ChainFile {
     from: Option<Checkpoint>,
 }
 
+/// What the files of all chains of a run have in common.
+pub struct ChainFiles<'a> {
+    /// The run's folder.
+    pub dir: &'a RunDir,
+    /// What tells the run from others.
+    pub run: &'a str,
+    /// What the files of draws say at their head.
+    pub comments: &'a [(&'a str, String)],
+}
+
 /// The name of a chain's draws; chains are counted from 0.
 fn draws_name(chain: u32) -> String {
     format!("chain-{}.csv", u64::from(chain) + 1)
@@ -36,27 +46,21 @@ fn about(name: &str, error: impl std::fmt::Display, kind: io::ErrorKind) -> io::
     io::Error::new(kind, format!("{name}: {error}"))
 }
 
-impl ChainFile {
+impl ChainFiles<'_> {
     /// Begins the files of a chain.
     ///
     /// # Errors
     /// If they cannot be written.
-    pub fn begin(
-        dir: &RunDir,
-        chain: u32,
-        run: &str,
-        comments: &[(&str, String)],
-        memory: &Memory,
-    ) -> io::Result<ChainFile> {
+    pub fn begin(&self, chain: u32, memory: &Memory) -> io::Result<ChainFile> {
         let name = draws_name(chain);
         let told = |e: io::Error| about(&name, &e, e.kind());
         // An earlier checkpoint must not outlive the draws it is of.
-        let checkpoint = dir.file(&checkpoint_name(chain));
+        let checkpoint = self.dir.file(&checkpoint_name(chain));
         if checkpoint.exists() {
             std::fs::remove_file(checkpoint)?;
         }
-        let draws = CsvSink::create(&dir.file(&name), chain, comments).map_err(told)?;
-        Ok(ChainFile { dir: dir.clone(), chain, run: run.into(), draws, memory: memory.clone(), from: None })
+        let draws = CsvSink::create(&self.dir.file(&name), chain, self.comments).map_err(told)?;
+        Ok(self.file(chain, draws, memory.clone(), None))
     }
 
     /// Takes up the files of a chain where its last checkpoint was; without one it begins anew. Draws after it are cut off: the chain
@@ -64,26 +68,20 @@ impl ChainFile {
     ///
     /// # Errors
     /// If the checkpoint is of another run or version, or the draws before it are not there.
-    pub fn resume(
-        dir: &RunDir,
-        chain: u32,
-        run: &str,
-        comments: &[(&str, String)],
-        memory: &Memory,
-    ) -> io::Result<ChainFile> {
+    pub fn resume(&self, chain: u32, memory: &Memory) -> io::Result<ChainFile> {
         let name = checkpoint_name(chain);
-        let bytes = match std::fs::read(dir.file(&name)) {
+        let bytes = match std::fs::read(self.dir.file(&name)) {
             Ok(bytes) => bytes,
             Err(e) if e.kind() == io::ErrorKind::NotFound => {
-                return ChainFile::begin(dir, chain, run, comments, memory);
+                return self.begin(chain, memory);
             }
             Err(e) => return Err(about(&name, &e, e.kind())),
         };
-        let read = SavedChain::read(&bytes, run);
+        let read = SavedChain::read(&bytes, self.run);
         let (saved, checkpoint) = read.map_err(|e| about(&name, e, io::ErrorKind::InvalidData))?;
         let name = draws_name(chain);
         let told = |e: io::Error| about(&name, &e, e.kind());
-        let mut file = File::options().read(true).write(true).open(dir.file(&name)).map_err(told)?;
+        let mut file = File::options().read(true).write(true).open(self.dir.file(&name)).map_err(told)?;
         let mut memory = memory.clone();
         memory.columns(checkpoint.columns())?;
         let mut rows = 0;
@@ -100,7 +98,11 @@ impl ChainFile {
         file.seek(SeekFrom::End(0)).map_err(told)?;
         let columns = (checkpoint.draws() > 0).then(|| checkpoint.columns());
         let draws = CsvSink::resume(file, saved.draws_end, columns);
-        Ok(ChainFile { dir: dir.clone(), chain, run: run.into(), draws, memory, from: Some(checkpoint) })
+        Ok(self.file(chain, draws, memory, Some(checkpoint)))
+    }
+
+    fn file(&self, chain: u32, draws: CsvSink, memory: Memory, from: Option<Checkpoint>) -> ChainFile {
+        ChainFile { dir: self.dir.clone(), chain, run: self.run.into(), draws, memory, from }
     }
 }
 

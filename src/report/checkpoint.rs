@@ -5,7 +5,7 @@
 //! may draw other numbers.
 
 use super::hash::bytes_hash;
-use crate::infer::{Checkpoint, StateError};
+use crate::infer::{Checkpoint, StateError, pack, unpack};
 use serde::{Deserialize, Serialize};
 
 const HEAD: &[u8] = b"pcadlang checkpoint 1\n";
@@ -51,9 +51,7 @@ impl SavedChain {
 
     /// The file.
     pub fn to_bytes(&self) -> Vec<u8> {
-        let mut body = Vec::new();
-        // Writing to memory does not fail.
-        let _ = ciborium::into_writer(self, &mut body);
+        let body = pack(self);
         [HEAD, bytes_hash(&body).as_bytes(), &body].concat()
     }
 
@@ -67,7 +65,7 @@ impl SavedChain {
         if bytes_hash(body).as_bytes() != hash {
             return Err(CheckpointError::Damaged);
         }
-        let saved: SavedChain = ciborium::from_reader(body).map_err(|e| StateError(e.to_string()))?;
+        let saved: SavedChain = unpack(body)?;
         if saved.version != VERSION {
             return Err(CheckpointError::Version(saved.version));
         }

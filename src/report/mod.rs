@@ -31,7 +31,7 @@ mod whole;
 
 pub use crate::infer::diagnostics::Summary;
 #[doc(hidden)]
-pub use chain_file::ChainFile;
+pub use chain_file::{ChainFile, ChainFiles};
 pub use draws::{ChainDraws, Quantity, quantities};
 #[doc(hidden)]
 pub use hash::{bytes_hash, text_hash};

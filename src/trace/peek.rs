@@ -7,7 +7,7 @@
 
 use super::choices::Target;
 use super::demand::Failure;
-use super::eval::{Score, apply};
+use super::eval::Score;
 use super::graph::Graph;
 use super::node::*;
 use super::propose::Weight;
@@ -253,12 +253,8 @@ impl Graph {
         let v = match self.op(code, n) {
             Op::Prim { builtin, args } => {
                 let values = self.peek_all(code, peek, value, frame, args)?;
-                let (builtin, values) = (code.builtins.get(*builtin), refs(&values));
-                let made = match builtin.resume(&values, self.kept(n).map(|b| &**b)) {
-                    None => apply(builtin, &values),
-                    Some(made) => made.map(|b| b.value),
-                };
-                made.map_err(|f| self.fail(code, n, f.kind, f.message, f.hint))?
+                let made = self.apply_at(n, code.builtins.get(*builtin), &refs(&values));
+                made.map_err(|f| self.fault(code, n, f))?.into_value()
             }
             Op::Array(items) => Value::from_elements(self.peek_all(code, peek, value, frame, items)?.into_vec()),
             Op::Record { names, values } => {

@@ -22,7 +22,6 @@ use crate::trace::{Constraint, Draws, Limits, Selector, Stop, Trace};
 use rustc_hash::FxHashMap;
 use std::collections::VecDeque;
 use std::sync::Arc;
-use std::sync::atomic::Ordering;
 
 /// How a statement ended.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
@@ -363,9 +362,9 @@ impl<'a> Runner<'a> {
         flow
     }
 
+    /// Whether somebody ended the run: its progress, whose flag is among those of the limits, or who watches it.
     pub fn is_cancelled(&self) -> bool {
-        let (stop, watch) = (&self.options.limits.stop, &self.options.watch);
-        self.progress.cancelled.load(Ordering::Relaxed) || stop.is_set() || watch.as_ref().is_some_and(|w| w.is_over())
+        self.options.limits.stop.is_set() || self.options.watch.as_ref().is_some_and(|w| w.is_over())
     }
 
     /// Whether the run, or the warm-up, has used up what it was given.

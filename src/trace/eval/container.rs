@@ -106,18 +106,17 @@ impl Graph {
                     for _ in *level as usize + 1..source.loops.len() {
                         f = self.nodes[self.frames[f as usize].owner as usize].frame;
                     }
-                    self.frames[f as usize].key.clone()
+                    let key = self.frames[f as usize].key.clone();
+                    key.ok_or_else(|| self.type_error(code, n, "this pass of the loop has no key".into()))?
                 }
                 SourceKey::Operand(o) => {
                     if let Some(m) = self.unready(frame, *o) {
                         return self.need(code, m).map(Some);
                     }
                     deps.extend(self.resolve(frame, *o));
-                    let value = self.value(code, frame, *o);
-                    Some(Key::of(value).map_err(|f| self.fault(code, n, f))?)
+                    Key::of(self.value(code, frame, *o)).map_err(|f| self.fault(code, n, f))?
                 }
             };
-            let Some(key) = key else { return Ok(None) };
             keys.push(key);
         }
         let element = Element { source: index, passes: passes.clone() };

@@ -104,7 +104,7 @@ impl Graph {
             Value::Builtin(i) => {
                 let builtin = code.builtins.get(*i);
                 let results: Result<Vec<Value>, Fault> =
-                    (0..keys.len()).map(|i| super::apply(builtin, &[&items.element(i).unwrap_or_default()])).collect();
+                    (0..keys.len()).map(|i| builtin.apply(&[&items.element(i).unwrap_or_default()])).collect();
                 let results = results.map_err(|e| self.fault(code, n, e))?;
                 let value = match keys {
                     Keys::Listed { ref keys, .. } if matches!(xs, Value::Record(_)) => {

@@ -165,7 +165,7 @@ impl Graph {
     }
 
     /// Calls a built-in at a node: an incremental function from where it was.
-    fn apply_at(&self, n: NodeId, builtin: &Builtin, values: &[&Value]) -> Result<Made, Fault> {
+    pub(super) fn apply_at(&self, n: NodeId, builtin: &Builtin, values: &[&Value]) -> Result<Made, Fault> {
         match builtin.resume(values, self.kept(n).map(|b| &**b)) {
             None => builtin.apply(values).map(Made::Value),
             Some(made) => made.map(Made::Kept),
@@ -199,13 +199,18 @@ impl Graph {
 }
 
 /// What a call gave.
-enum Made {
+pub(super) enum Made {
     Value(Value),
     /// With what to start from next time.
     Kept(Before),
 }
 
-/// Calls a built-in with values.
-pub(crate) fn apply(builtin: &Builtin, values: &[&Value]) -> Result<Value, Fault> {
-    builtin.apply(values)
+impl Made {
+    /// The value alone.
+    pub fn into_value(self) -> Value {
+        match self {
+            Made::Value(value) => value,
+            Made::Kept(before) => before.value,
+        }
+    }
 }
