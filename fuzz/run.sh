@@ -10,6 +10,9 @@ seconds=${1:-60}
 jobs=${JOBS:-1}
 targets=${*:-$(cargo +nightly fuzz list)}
 cargo +nightly fuzz build || exit 1
+# The programs built now are run, whatever is edited during the sitting.
+built=target/$(rustc -vV | sed -n 's/^host: //p')/release
+export ASAN_OPTIONS="${ASAN_OPTIONS:-detect_odr_violation=0}"
 logs=target/logs
 mkdir -p "$logs"
 printf '| target | executions | a second | coverage | findings |\n| --- | --- | --- | --- | --- |\n'
@@ -20,8 +23,8 @@ for t in $targets; do
     pids=
     for j in $(seq "$jobs"); do
         # With -fork a finding does not end the sitting.
-        cargo +nightly fuzz run "$t" -- -max_total_time="$seconds" -timeout=20 -rss_limit_mb=4096 -max_len=16384 \
-            -fork=1 -ignore_crashes=1 -ignore_ooms=1 -ignore_timeouts=1 >"$logs/$t.$j" 2>&1 &
+        "$built/$t" -max_total_time="$seconds" -timeout=20 -rss_limit_mb=4096 -max_len=16384 -fork=1 -ignore_crashes=1 \
+            -ignore_ooms=1 -ignore_timeouts=1 -artifact_prefix="artifacts/$t/" "corpus/$t" >"$logs/$t.$j" 2>&1 &
         pids="$pids $!"
     done
     wait $pids
