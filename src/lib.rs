@@ -30,10 +30,14 @@ pub mod render;
 pub mod report;
 pub mod rng;
 #[doc(hidden)]
+pub mod score;
+#[doc(hidden)]
 pub mod session;
 #[doc(hidden)]
 pub mod syntax;
 pub mod trace;
+#[doc(hidden)]
+pub mod tradeoff;
 #[doc(hidden)]
 pub mod vision;
 

@@ -45,6 +45,8 @@ fn modules_depend_one_way() {
         ("infer", &["infer", "trace", "lang", "syntax", "diag", "dist", "num", "platform", "rng"]),
         ("host", &["host", "infer", "lang", "syntax", "diag", "dist", "render", "rng", "Error"]),
         ("report", &["report", "infer", "num"]),
+        ("score", &["score"]),
+        ("tradeoff", &["tradeoff", "rng"]),
         (
             "session",
             &[

@@ -1,6 +1,8 @@
 //! The command line.
 
+use clap::builder::{PossibleValuesParser, TypedValueParser};
 use clap::{Args, Parser, Subcommand, ValueHint};
+use pcadlang::tradeoff::Quality;
 use std::path::PathBuf;
 use std::time::Duration;
 
@@ -20,6 +22,8 @@ pub enum Command {
     Run(Run),
     /// Run a program on every picture of a dataset and write what scorers read
     Evaluate(Evaluate),
+    /// Measure what speed costs in accuracy, over settings and cases with known answers
+    Tradeoff(Tradeoff),
     /// Draw scenes from the prior and show them on one sheet
     Sample(Sample),
     /// Draw scenes from the prior into a bank, from which the kernel `knn` proposes
@@ -70,15 +74,33 @@ pub struct Allowed {
     pub limits: Vec<(String, u64)>,
 }
 
+/// `--quality`.
+#[derive(Clone, Copy, Debug, PartialEq, Eq)]
+pub enum QualityArg {
+    /// A place on the front of speed and accuracy.
+    Known(Quality),
+    /// The program as it is.
+    Own,
+}
+
+impl QualityArg {
+    fn parser() -> impl TypedValueParser<Value = QualityArg> {
+        PossibleValuesParser::new(super::quality::names()).map(|name| {
+            let known = Quality::ALL.into_iter().find(|q| q.name() == name);
+            known.map_or(QualityArg::Own, QualityArg::Known)
+        })
+    }
+}
+
 /// How a program is sampled.
-#[derive(Args, Clone, Debug)]
+#[derive(Args, Clone, Debug, Default)]
 pub struct Sampling {
     /// The seed: same seed, same draws
     #[arg(long, default_value_t = 1)]
     pub seed: u64,
-    /// The number of chains
-    #[arg(long, default_value_t = 4, value_parser = clap::value_parser!(u32).range(1..=1024))]
-    pub chains: u32,
+    /// The number of chains; 4 if left out
+    #[arg(long, value_parser = clap::value_parser!(u32).range(1..=1024))]
+    pub chains: Option<u32>,
     /// The number of threads; as many as the machine has, if left out
     #[arg(long, value_parser = clap::value_parser!(u32).range(1..=1024))]
     pub threads: Option<u32>,
@@ -88,12 +110,26 @@ pub struct Sampling {
     /// Kernel applications per chain in warm-up, in place of what the program says
     #[arg(long)]
     pub warmup: Option<u64>,
-    /// Time in all (of a dataset: each case), such as 10s, 2m or 500ms; at most half of it is warm-up
+    /// Known settings for so much accuracy, if there are any of the program: `own` runs it as it is
+    #[arg(long, value_parser = QualityArg::parser())]
+    pub quality: Option<QualityArg>,
+    /// Time in all (of a dataset: each case), such as 10s, 2m or 500ms; at most half of it is warm-up. Settings that are known to be
+    /// best for it are used, unless there is --quality
     #[arg(long, value_parser = duration)]
     pub time: Option<Duration>,
     /// Re-run the whole program at each step: slow, and the same draws; for checking the engine
     #[arg(long)]
     pub no_incremental: bool,
+}
+
+impl Sampling {
+    /// The number of chains where nobody says.
+    pub const CHAINS: u32 = 4;
+
+    /// The number of chains.
+    pub fn chains(&self) -> u32 {
+        self.chains.unwrap_or(Self::CHAINS)
+    }
 }
 
 /// One run: a program, what it observes, how it is sampled.
@@ -119,6 +155,13 @@ pub struct Job {
     /// Seed, chains, steps, time
     #[command(flatten)]
     pub sampling: Sampling,
+}
+
+impl Job {
+    /// A run that observes nothing.
+    pub fn of(given: Given, sampling: Sampling) -> Job {
+        Job { given, observe: Vec::new(), observe_contours: None, keypoints: None, features_from: None, sampling }
+    }
 }
 
 /// `run`.
@@ -187,6 +230,62 @@ Nothing else in it is read: neither other files nor other fields.
 
 DIR gets, besides a folder for each case, evaluation.json, table.md and, for people, predictions.json. Run again to go on
 after an interruption. Exit code 1 if a case failed, 3 if interrupted.";
+
+/// `tradeoff`.
+#[derive(Args, Debug)]
+#[command(after_help = ANSWERS)]
+pub struct Tradeoff {
+    /// Program, parameters, camera
+    #[command(flatten)]
+    pub given: Given,
+    /// The cases: a folder for each, with what is observed and the known answer
+    #[arg(long, value_name = "DIR")]
+    pub cases: PathBuf,
+    /// The settings to try, as JSON; PROG with the ending .settings.json if left out
+    #[arg(long, value_name = "FILE")]
+    pub settings: Option<PathBuf>,
+    /// Detected keypoints of the cases: {CASE: {"keypoints": {NAME: [x, y, …], …}}, …}
+    #[arg(long, value_name = "FILE")]
+    pub keypoints: Option<PathBuf>,
+    /// The folder for results; one that has some of the same kind is taken up
+    #[arg(long, value_name = "DIR", default_value = "tradeoff")]
+    pub out: PathBuf,
+    /// Time for everything, earlier sittings in the folder included; if it is short, settings that fall behind on a few cases are left out
+    /// on the others
+    #[arg(long, value_parser = duration, default_value = "1h")]
+    pub budget: Duration,
+    /// Runs of each setting on each case
+    #[arg(long, default_value_t = 1, value_parser = clap::value_parser!(u32).range(1..=1000))]
+    pub seeds: u32,
+    /// Some of the cases, separated by commas
+    #[arg(long, value_name = "CASES", value_delimiter = ',')]
+    pub only: Vec<String>,
+    /// The number of threads of each run; 2 if left out
+    #[arg(long, value_parser = clap::value_parser!(u32).range(1..=1024))]
+    pub threads: Option<u32>,
+    /// How many runs at once; as many as there are threads for, if left out
+    #[arg(long, value_parser = clap::value_parser!(u32).range(1..=1024))]
+    pub jobs: Option<u32>,
+    /// Write the front here too: as PROG with the ending .quality.json, --quality and --time of `run` find it
+    #[arg(long, value_name = "FILE")]
+    pub presets: Option<PathBuf>,
+    /// Measure everything anew
+    #[arg(long)]
+    pub fresh: bool,
+    /// Print nothing but errors
+    #[arg(long)]
+    pub quiet: bool,
+}
+
+/// What a known answer is.
+const ANSWERS: &str = "\
+A case is a folder with image.png (or .jpg), camera.json if its camera is known, and the answer: depth.npy (and normals.npy), or
+gt.npz with arrays of these names; or one of the people of annotations.json, its `keypoints` the answer. Without pictures: a folder
+with reference.json, {QUANTITY: {\"mean\": …, \"sd\": …}, …}, and a file called like each `data` item, such as y.csv.
+
+Settings: {\"base\": {\"chains\": 4, \"size\": 128}, \"cross\": {\"time\": [1, 3]}, \"vary\": {\"size\": [64], \"chains\": [1, 2]}}
+Each value of `cross` with each change of `vary`, one at a time; `also` is a list of more, `random` a number of random ones. Names other
+than program, chains, time, steps and warmup are parameters of the program.";
 
 /// `sample`.
 #[derive(Args, Debug)]

@@ -3,11 +3,12 @@
 //! Not the run (`job`), and not what is printed.
 
 use super::job::write;
+use super::progress::Ending;
 use super::{Failure, plain, scene};
 use image::GrayImage;
 use pcadlang::Model;
 use pcadlang::geom::{Mesh, Solid, glb, obj};
-use pcadlang::infer::ChainResult;
+use pcadlang::infer::{BestSoFar, ChainResult};
 use pcadlang::lang::builtins::scene::ViewValue;
 use pcadlang::render::View;
 use pcadlang::report::pictures::{self, png};
@@ -16,6 +17,10 @@ use pcadlang::session::{exported, exported_operand, over, strokes};
 use pcadlang::trace::Trace;
 use pcadlang::vision::Photo;
 use std::sync::Arc;
+use std::time::{Duration, Instant};
+
+/// When the best state is written for the first time.
+const FIRST: Duration = Duration::from_millis(200);
 
 /// What the page shows of the best draw.
 #[derive(Default)]
@@ -54,6 +59,23 @@ pub fn best_draw(
         export(dir, model, &mut trace, x, seed)?;
     }
     Ok(shown)
+}
+
+/// Writes the best state so far as `best.trace.json` while the chains run, until they end: ever less often, but as often as checkpoints
+/// are kept. What cannot be written is said at the end.
+pub fn keep_best(dir: &RunDir, model: &Model, best: &BestSoFar, ending: &Ending, most: Duration) {
+    let (begun, mut written) = (Instant::now(), f64::NEG_INFINITY);
+    while !ending.within((begun.elapsed() / 2).clamp(FIRST.min(most), most)) {
+        let Some(state) = best.state().filter(|s| s.log_joint > written) else { continue };
+        let (code, limits) = (Arc::clone(model.code()), model.limits().clone());
+        let built = Trace::generate(code, state.choices.iter().cloned(), scene::predictive(0, 0), limits);
+        if let Ok((trace, _)) = built
+            && let Ok(saved) = serde_json::to_vec(&trace.save(model.hash()))
+            && dir.write("best.trace.json", &saved).is_ok()
+        {
+            written = state.log_joint;
+        }
+    }
 }
 
 /// Depth, normals, mask and meshes at the input's resolution; overlay, contours and mask frequency as pictures.

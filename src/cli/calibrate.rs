@@ -3,7 +3,8 @@
 
 use super::args::{Check, Given, Job, Sampling};
 use super::job::{Interrupt, machine_threads};
-use super::{Failure, given, plain, progress};
+use super::progress::{self, Ending};
+use super::{Failure, given, plain};
 use pcadlang::infer::calibration::{
     CalibrationError, FALSE_ALARMS, Geweke, PlanSampler, RANKS, Sampler, Sbc, Settings, geweke, sbc,
 };
@@ -11,7 +12,7 @@ use pcadlang::infer::{Progress, RunOptions};
 use pcadlang::report::{number, seconds, table};
 use pcadlang::{Model, infer};
 use std::sync::Arc;
-use std::sync::atomic::{AtomicBool, Ordering};
+use std::sync::atomic::Ordering;
 use std::time::Instant;
 
 /// Data sets of `--sbc`, chains of `--geweke`, where none are asked for.
@@ -56,15 +57,7 @@ fn job(a: &Check, path: &str) -> Job {
         observe: a.observe.clone(),
         observe_contours: None,
         keypoints: None,
-        sampling: Sampling {
-            seed: a.seed,
-            chains: 1,
-            threads: a.threads,
-            steps: a.steps,
-            warmup: None,
-            time: None,
-            no_incremental: false,
-        },
+        sampling: Sampling { seed: a.seed, chains: Some(1), threads: a.threads, steps: a.steps, ..Sampling::default() },
     }
 }
 
@@ -87,14 +80,14 @@ fn run<T>(
         steps: a.steps,
         limits: model.limits().clone(),
     };
-    let (progress, done) = (Arc::new(Progress::default()), AtomicBool::new(false));
+    let (progress, ending) = (Arc::new(Progress::default()), Ending::default());
     interrupt.ends(&progress);
     let options = RunOptions { seed: a.seed, ..RunOptions::default() };
     let sampler = PlanSampler { plan: &plan, options, progress: &progress };
     let said = std::thread::scope(|scope| {
-        scope.spawn(|| progress::watch(&progress, &done, None, false));
+        scope.spawn(|| progress::watch(&progress, &ending, None, false));
         let said = method(model.code(), &sampler, &settings);
-        done.store(true, Ordering::Relaxed);
+        ending.end();
         said
     });
     if progress.cancelled.load(Ordering::Relaxed) {

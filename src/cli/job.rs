@@ -3,12 +3,13 @@
 //! Invariant: `run.json` says `done` only when every other file of the folder is whole.
 
 use super::args::Job;
-use super::best::best_draw;
+use super::best::{best_draw, keep_best};
 use super::keypoints::Joints;
-use super::{Failure, files, given, plain, progress};
+use super::progress::{self, Ending};
+use super::{Failure, files, given, plain};
 use pcadlang::bank::BankFiles;
 use pcadlang::infer::draws::{KernelStats, Sink, SiteStats};
-use pcadlang::infer::{ChainResult, Progress};
+use pcadlang::infer::{BestSoFar, ChainResult, Progress, Watch, Watches};
 use pcadlang::report::html::{MeshData, Page, page};
 use pcadlang::report::{
     ChainDraws, ChainFiles, Memory, Mode, Quantity, RunDir, bytes_hash, modes, quantities, seconds, table, text_hash,
@@ -54,6 +55,13 @@ pub struct Outcome {
     pub interrupted: bool,
 }
 
+impl Ready {
+    /// Width and height of the photograph, if there is one.
+    pub fn size(&self) -> Option<(u32, u32)> {
+        self.photo.as_ref().map(|p| (p.width(), p.height()))
+    }
+}
+
 impl Outcome {
     /// The time of all kernels after warm-up, over all chains, in seconds.
     pub fn kernel_seconds(&self) -> f64 {
@@ -82,11 +90,11 @@ pub fn prepare(job: &Job, quiet: bool) -> Result<Ready, Failure> {
     Ok(Ready { model: program.compile()?, photo, begun })
 }
 
-/// Ctrl-C, for one run after the other.
+/// Ctrl-C, for all runs there are.
 #[derive(Default)]
 pub struct Interrupt {
     asked: AtomicBool,
-    run: Mutex<Weak<Progress>>,
+    runs: Mutex<Vec<Weak<Progress>>>,
 }
 
 impl Interrupt {
@@ -112,14 +120,18 @@ impl Interrupt {
 
     /// Ends this run at its next step when asked, or at once if that was before.
     pub fn ends(&self, run: &Arc<Progress>) {
-        *self.run.lock().unwrap_or_else(PoisonError::into_inner) = Arc::downgrade(run);
+        let mut runs = self.runs.lock().unwrap_or_else(PoisonError::into_inner);
+        runs.retain(|r| r.strong_count() > 0);
+        runs.push(Arc::downgrade(run));
+        drop(runs);
         if self.asked() {
             self.pass_on();
         }
     }
 
     fn pass_on(&self) {
-        if let Some(run) = self.run.lock().unwrap_or_else(PoisonError::into_inner).upgrade() {
+        let runs = self.runs.lock().unwrap_or_else(PoisonError::into_inner);
+        for run in runs.iter().filter_map(Weak::upgrade) {
             run.cancelled.store(true, Ordering::Relaxed);
         }
     }
@@ -172,7 +184,7 @@ pub fn record(job: &Job, program_hash: &str, inputs: &str) -> Map<String, Value>
         "observe": observed(job).collect::<Vec<_>>(),
         "set": job.given.sets.iter().map(|(k, v)| (k.clone(), json!(v))).collect::<Map<_, _>>(),
         "settings": {
-            "chains": s.chains, "steps": s.steps, "warmup": s.warmup,
+            "chains": s.chains(), "steps": s.steps, "warmup": s.warmup,
             "time": s.time.map(|t| t.as_secs_f64()), "incremental": !s.no_incremental,
         },
     });
@@ -237,6 +249,23 @@ pub fn perform(
     })
 }
 
+/// How the chains of a job are run, and who watches them.
+pub fn options(job: &Job, ready: &Ready, watch: Option<Arc<dyn Watch>>) -> RunOptions {
+    let (s, model) = (&job.sampling, &ready.model);
+    RunOptions {
+        seed: s.seed,
+        steps: s.steps,
+        warmup: s.warmup,
+        // What is left of the time after compiling.
+        time: s.time.map(|t| t.saturating_sub(ready.begun.elapsed())),
+        incremental: !s.no_incremental,
+        limits: model.limits().clone(),
+        watch,
+        banks: Some(Arc::new(BankFiles::new(model, folder(&job.given.program), job.features_from.clone()))),
+        sites: true,
+    }
+}
+
 fn fill(
     job: &Job,
     ready: &Ready,
@@ -247,28 +276,21 @@ fn fill(
 ) -> Result<Outcome, Failure> {
     let Ready { model, photo, begun } = ready;
     let s = &job.sampling;
-    let joints = Joints::new(s.chains, photo.as_ref().map(|p| (p.width(), p.height())));
-    let options = RunOptions {
-        seed: s.seed,
-        steps: s.steps,
-        warmup: s.warmup,
-        // What is left of the time after compiling.
-        time: s.time.map(|t| t.saturating_sub(begun.elapsed())),
-        incremental: !s.no_incremental,
-        limits: model.limits().clone(),
-        watch: Some(Arc::new(joints.clone())),
-        banks: Some(Arc::new(BankFiles::new(model, folder(&job.given.program), job.features_from.clone()))),
-        sites: true,
-    };
-    let memories: Vec<Memory> = (0..s.chains).map(|_| Memory::bounded(ROOM / s.chains as usize)).collect();
+    let joints = Joints::new(s.chains(), ready.size());
+    let progress = Arc::new(Progress::default());
+    let best = Arc::new(BestSoFar::new(s.chains(), &progress));
+    let watches: Vec<Arc<dyn Watch>> = vec![Arc::new(joints.clone()), best.clone()];
+    let options = options(job, ready, Some(Arc::new(Watches(watches))));
+    let memories: Vec<Memory> = (0..s.chains()).map(|_| Memory::bounded(ROOM / s.chains() as usize)).collect();
     let sinks = sinks(dir, job, model, &memories, record, manner.resume)?;
-    let (progress, done) = (Arc::new(Progress::default()), AtomicBool::new(false));
+    let ending = Ending::default();
     interrupt.ends(&progress);
     let results = std::thread::scope(|scope| {
-        scope.spawn(|| progress::watch(&progress, &done, options.time, !manner.live));
-        scope.spawn(|| progress::ask_for_checkpoints(&progress, &done, manner.checkpoint));
+        scope.spawn(|| progress::watch(&progress, &ending, options.time, !manner.live));
+        scope.spawn(|| progress::ask_for_checkpoints(&progress, &ending, manner.checkpoint));
+        scope.spawn(|| keep_best(dir, model, &best, &ending, manner.checkpoint));
         let results = model.run_into(&options, threads(job), &progress, sinks);
-        done.store(true, Ordering::Relaxed);
+        ending.end();
         results
     })?;
     let interrupted = progress.cancelled.load(Ordering::Relaxed);
@@ -365,7 +387,7 @@ fn settings(job: &Job, model: &Model, elapsed: f64) -> Vec<(&'static str, String
         ("version", env!("CARGO_PKG_VERSION").to_owned()),
         ("program hash", model.hash().to_owned()),
         ("seed", job.sampling.seed.to_string()),
-        ("chains", job.sampling.chains.to_string()),
+        ("chains", job.sampling.chains().to_string()),
         ("time", seconds(elapsed)),
     ];
     all.extend(job.given.sets.iter().map(|(k, v)| ("set", format!("{k} = {v}"))));

@@ -39,7 +39,17 @@ impl Joints {
         self.size.unwrap_or((view.0.camera().width, view.0.camera().height))
     }
 
-    fn positions(&self, view: &ViewValue) -> Vec<(Arc<str>, Option<[f64; 2]>)> {
+    /// Means and spreads over all draws of all chains so far.
+    pub fn moments(&self) -> Moments {
+        let mut all = Moments::default();
+        for chain in self.chains.iter() {
+            all.merge(&chain.lock().unwrap_or_else(PoisonError::into_inner).moments);
+        }
+        all
+    }
+
+    /// The landmarks of a view; none before the camera.
+    pub fn positions(&self, view: &ViewValue) -> Vec<(Arc<str>, Option<[f64; 2]>)> {
         let (width, height) = self.pixels(view);
         view.landmarks(width, height).map(|(name, at)| (Arc::clone(name), at)).collect()
     }
@@ -51,10 +61,7 @@ impl Joints {
         if best.is_empty() {
             return None;
         }
-        let mut all = Moments::default();
-        for chain in self.chains.iter() {
-            all.merge(&chain.lock().unwrap_or_else(PoisonError::into_inner).moments);
-        }
+        let all = self.moments();
         let numbers = |xs: &[f64]| xs.iter().map(|x| rounded(*x)).collect::<Value>();
         let keypoints: Map<String, Value> =
             all.iter().map(|(name, p)| (name.to_owned(), numbers(&[p.mean[0], p.mean[1], p.sd()]))).collect();

@@ -17,11 +17,13 @@ mod learn;
 mod manual;
 mod predict;
 mod progress;
+mod quality;
 mod repl;
 mod run;
 mod sample;
 mod scene;
 mod term;
+mod tradeoff;
 mod watch;
 
 use args::{Cli, Command};
@@ -67,6 +69,7 @@ pub fn main(cli: Cli) -> ExitCode {
     let done = match cli.command {
         Command::Run(a) => run::run(&a),
         Command::Evaluate(a) => evaluate::evaluate(&a),
+        Command::Tradeoff(a) => tradeoff::tradeoff(&a),
         Command::Sample(a) => sample::sample(&a),
         Command::Learn(a) => learn::learn(&a),
         Command::Check(a) if a.sbc || a.geweke => calibrate::calibrate(&a),

@@ -1,9 +1,10 @@
 //! `pcadlang predict`: what would be observed again, drawn from the prior or the posterior, against what is observed. The draws
 //! are the library's ([`pcadlang::infer::predictive`]); here they become a table and a file.
 
-use super::args::Predict;
+use super::args::{Job, Predict};
 use super::job::{self, Interrupt, write};
-use super::{Failure, plain, progress};
+use super::progress::{self, Ending};
+use super::{Failure, plain, quality};
 use pcadlang::infer::draws::{Discard, Sink};
 use pcadlang::infer::predictive::{Predictive, Replication, STATISTICS, observed, prior, statistics, tail};
 use pcadlang::infer::{Progress, diagnostics};
@@ -12,7 +13,7 @@ use pcadlang::{Model, RunOptions};
 use std::fmt::Write;
 use std::path::Path;
 use std::sync::Arc;
-use std::sync::atomic::{AtomicBool, Ordering};
+use std::sync::atomic::Ordering;
 use std::time::Instant;
 
 /// Beyond so many numbers in all, only statistics are written.
@@ -23,11 +24,12 @@ const EXTREME: f64 = 0.01;
 /// Draws, writes `predictive.csv`, prints the table.
 pub fn predict(a: &Predict) -> Result<(), Failure> {
     let begun = Instant::now();
-    let ready = job::prepare(&a.job, false)?;
+    let job = &quality::filled(&a.job, a.prior)?;
+    let ready = job::prepare(job, false)?;
     let model = &ready.model;
     let (what, draws) = match a.prior {
         true => ("prior", vec![from_prior(a, model)?]),
-        false => ("posterior", from_posterior(a, model)?),
+        false => ("posterior", from_posterior(job, model)?),
     };
     let now = observed(&model.simulate(a.job.sampling.seed, 0)?);
     let silent: Vec<&(String, String)> =
@@ -59,9 +61,9 @@ fn from_prior(a: &Predict, model: &Model) -> Result<Vec<Replication>, Failure> {
     drawn.map_err(|e| model.chain_error(e).into())
 }
 
-fn from_posterior(a: &Predict, model: &Model) -> Result<Vec<Vec<Replication>>, Failure> {
-    let s = &a.job.sampling;
-    let watch = Predictive::new(s.chains, s.seed);
+fn from_posterior(job: &Job, model: &Model) -> Result<Vec<Vec<Replication>>, Failure> {
+    let s = &job.sampling;
+    let watch = Predictive::new(s.chains(), s.seed);
     let options = RunOptions {
         seed: s.seed,
         steps: s.steps,
@@ -71,14 +73,14 @@ fn from_posterior(a: &Predict, model: &Model) -> Result<Vec<Vec<Replication>>, F
         watch: Some(Arc::new(watch.clone())),
         ..RunOptions::default()
     };
-    let sinks = (0..s.chains).map(|_| Box::new(Discard) as Box<dyn Sink>).collect();
-    let (progress, done) = (Arc::new(Progress::default()), AtomicBool::new(false));
+    let sinks = (0..s.chains()).map(|_| Box::new(Discard) as Box<dyn Sink>).collect();
+    let (progress, ending) = (Arc::new(Progress::default()), Ending::default());
     let interrupt = Interrupt::listen();
     interrupt.ends(&progress);
     let results = std::thread::scope(|scope| {
-        scope.spawn(|| progress::watch(&progress, &done, s.time, false));
-        let results = model.run_into(&options, job::threads(&a.job), &progress, sinks);
-        done.store(true, Ordering::Relaxed);
+        scope.spawn(|| progress::watch(&progress, &ending, s.time, false));
+        let results = model.run_into(&options, job::threads(job), &progress, sinks);
+        ending.end();
         results
     })?;
     results.into_iter().collect::<Result<Vec<_>, _>>().map_err(|e| model.chain_error(e))?;

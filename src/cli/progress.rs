@@ -5,13 +5,36 @@ use indicatif::{ProgressBar, ProgressDrawTarget, ProgressStyle};
 use pcadlang::infer::Progress;
 use pcadlang::report::{number, seconds};
 use std::sync::atomic::{AtomicBool, AtomicU64, Ordering};
+use std::sync::{Condvar, Mutex, PoisonError};
 use std::time::{Duration, Instant};
 
 /// Between two looks at the chains.
 const PAUSE: Duration = Duration::from_millis(100);
 
-/// Shows progress until `done`; a limit of time makes it a bar.
-pub fn watch(progress: &Progress, done: &AtomicBool, limit: Option<Duration>, quiet: bool) {
+/// The end of a run, which others wait for.
+#[derive(Default)]
+pub struct Ending {
+    ended: Mutex<bool>,
+    changed: Condvar,
+}
+
+impl Ending {
+    /// It is there.
+    pub fn end(&self) {
+        *self.ended.lock().unwrap_or_else(PoisonError::into_inner) = true;
+        self.changed.notify_all();
+    }
+
+    /// Waits for it, but not longer than this; whether it came.
+    pub fn within(&self, time: Duration) -> bool {
+        let ended = self.ended.lock().unwrap_or_else(PoisonError::into_inner);
+        let waited = self.changed.wait_timeout_while(ended, time, |ended| !*ended);
+        *waited.unwrap_or_else(PoisonError::into_inner).0
+    }
+}
+
+/// Shows progress until the end; a limit of time makes it a bar.
+pub fn watch(progress: &Progress, ending: &Ending, limit: Option<Duration>, quiet: bool) {
     if quiet || !term::is_live() {
         return;
     }
@@ -22,7 +45,7 @@ pub fn watch(progress: &Progress, done: &AtomicBool, limit: Option<Duration>, qu
     if let Ok(style) = ProgressStyle::with_template(template) {
         bar.set_style(style);
     }
-    while !done.load(Ordering::Relaxed) {
+    while !ending.within(PAUSE) {
         let elapsed = begun.elapsed();
         let steps = progress.steps.load(Ordering::Relaxed);
         // No bits: nothing is known yet.
@@ -32,20 +55,14 @@ pub fn watch(progress: &Progress, done: &AtomicBool, limit: Option<Duration>, qu
         }
         bar.set_message(line(steps, elapsed, best, limit));
         bar.tick();
-        std::thread::sleep(PAUSE);
     }
     bar.finish_and_clear();
 }
 
-/// Has the chains hand over checkpoints at even distances of time, until `done`.
-pub fn ask_for_checkpoints(progress: &Progress, done: &AtomicBool, every: Duration) {
-    let mut last = Instant::now();
-    while !done.load(Ordering::Relaxed) {
-        std::thread::sleep(PAUSE.min(every));
-        if last.elapsed() >= every {
-            last = Instant::now();
-            progress.checkpoints.fetch_add(1, Ordering::Relaxed);
-        }
+/// Has the chains hand over checkpoints at even distances of time, until the end.
+pub fn ask_for_checkpoints(progress: &Progress, ending: &Ending, every: Duration) {
+    while !ending.within(every) {
+        progress.checkpoints.fetch_add(1, Ordering::Relaxed);
     }
 }
 

@@ -1,22 +1,23 @@
 //! `pcadlang run`: one run, its folder, and what is said of it at the end.
 
-use super::args::Run;
+use super::args::{Job, Run};
 use super::job::{self, Interrupt, Manner, Outcome};
-use super::{Failure, earlier, plain};
+use super::{Failure, earlier, plain, quality};
 use pcadlang::report::{RunDir, modes_table, seconds, table};
 use serde_json::json;
 use std::path::Path;
 
 /// Runs a program and leaves its folder.
 pub fn run(a: &Run) -> Result<(), Failure> {
-    let ready = job::prepare(&a.job, a.quiet)?;
+    let job = &quality::filled(&a.job, a.quiet)?;
+    let ready = job::prepare(job, a.quiet)?;
     let (_, default_plan) = ready.model.plan()?;
     if let (Some(text), false) = (&default_plan, a.quiet) {
         eprintln!("note: the program has no `infer` block; this plan is used, copy and edit it:\n{text}");
     }
     let interrupt = Interrupt::listen();
-    let record = job::record(&a.job, ready.model.hash(), &job::inputs_hash(&a.job, &ready.model)?);
-    let (runs, name) = (Path::new("runs"), job::stem(&a.job.given.program));
+    let record = job::record(job, ready.model.hash(), &job::inputs_hash(job, &ready.model)?);
+    let (runs, name) = (Path::new("runs"), job::stem(&job.given.program));
     let dir = match &a.out {
         Some(path) if a.resume => earlier::resumed(path, &record)?,
         None if a.resume => earlier::resumed(&RunDir::latest(runs, name), &record)?,
@@ -24,14 +25,14 @@ pub fn run(a: &Run) -> Result<(), Failure> {
         None => RunDir::fresh(runs, name).map_err(|e| plain(e.to_string()))?,
     };
     let manner = Manner { live: !(a.quiet || a.json), checkpoint: a.checkpoint, resume: a.resume };
-    let outcome = job::perform(&a.job, &ready, &dir, &record, &interrupt, manner)?;
-    show(a, &dir, &outcome);
+    let outcome = job::perform(job, &ready, &dir, &record, &interrupt, manner)?;
+    show(a, job, &dir, &outcome);
     if outcome.interrupted { Err(Failure::Interrupted) } else { Ok(()) }
 }
 
 /// The end of a run on the terminal.
-fn show(a: &Run, dir: &RunDir, o: &Outcome) {
-    let seed = a.job.sampling.seed;
+fn show(a: &Run, job: &Job, dir: &RunDir, o: &Outcome) {
+    let seed = job.sampling.seed;
     if a.json {
         let all = job::summaries(&o.quantities, o.kernel_seconds());
         println!(
@@ -69,8 +70,8 @@ fn show(a: &Run, dir: &RunDir, o: &Outcome) {
     let steps: u64 = o.chains.iter().map(|c| c.steps + c.warmup).sum();
     let most = o.chains.iter().map(|c| (c.steps, c.warmup)).max().unwrap_or_default();
     println!("seed {seed}, {} chains, {steps} steps in {}", o.chains.len(), seconds(o.seconds));
-    if a.job.sampling.time.is_some() {
-        println!("the longest chain again: --steps {} --warmup {}", most.0, most.1);
+    if job.sampling.time.is_some() {
+        println!("the longest chain again: --steps {} --warmup {}{}", most.0, most.1, quality::again(job));
     }
     if o.interrupted {
         println!(

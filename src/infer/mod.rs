@@ -2,6 +2,7 @@
 
 #![doc = include_str!("guide.md")]
 
+mod best;
 mod build;
 #[doc(hidden)]
 pub mod calibration;
@@ -28,9 +29,12 @@ mod resampling;
 mod selection;
 mod sites;
 mod state;
+mod watches;
 
 use crate::platform::threads as parallel;
 pub(crate) use crate::platform::threads::in_parallel;
+#[doc(hidden)]
+pub use best::{BestSoFar, BestState};
 #[doc(hidden)]
 pub use chains::run_chains;
 #[doc(hidden)]
@@ -57,3 +61,5 @@ pub use plan::{ChainError, ChainResult, Checkpoint, Progress, RunOptions, Watch}
 pub use selection::selected;
 pub use state::StateError;
 pub(crate) use state::{pack, unpack};
+#[doc(hidden)]
+pub use watches::Watches;

@@ -34,6 +34,7 @@ impl Loader for Nowhere {
 pub const EMBEDDED: &[(&str, &str)] = &[
     ("coin.pcad", include_str!("../../programs/coin.pcad")),
     ("linreg.pcad", include_str!("../../programs/linreg.pcad")),
+    ("linreg.settings.json", include_str!("../../programs/linreg.settings.json")),
     ("mixture.pcad", include_str!("../../programs/mixture.pcad")),
     ("crp.pcad", include_str!("../../programs/crp.pcad")),
     ("geometric.pcad", include_str!("../../programs/geometric.pcad")),

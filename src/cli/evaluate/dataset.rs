@@ -84,6 +84,21 @@ impl Dataset {
     }
 }
 
+/// Whether all names of `--only` are those of cases.
+pub fn known<'a>(dataset: &Path, only: &[String], names: impl Iterator<Item = &'a str>) -> Result<(), Failure> {
+    let names: Vec<&str> = names.collect();
+    match only.iter().find(|n| !names.contains(&n.as_str())) {
+        None => Ok(()),
+        Some(n) => {
+            let hint = match pcadlang::diag::nearest(n, names.iter().copied()) {
+                Some(near) => format!("did you mean `{near}`?"),
+                None => format!("there are {}", names.join(", ")),
+            };
+            Err(Failure::Plain(format!("{}: there is no case {n:?}", dataset.display()), Some(hint)))
+        }
+    }
+}
+
 fn people(path: &Path) -> Result<Dataset, Failure> {
     let file = path.join(ANNOTATIONS);
     let all: Annotations = serde_json::from_slice(&files::read(&file)?).map_err(|e| {

@@ -9,9 +9,10 @@ mod observed;
 use super::args::{Evaluate, Given, Job};
 use super::earlier;
 use super::job::{CHECKPOINT, Interrupt, Manner};
-use super::{Failure, given, job, plain, term};
-use dataset::{Case, Dataset, Layout};
-use observed::{Detections, Items, observations_for};
+use super::{Failure, given, job, plain, quality, term};
+use dataset::Case;
+pub use dataset::{Dataset, Layout, known};
+pub use observed::{Detections, Items, observations_for};
 use pcadlang::report::evaluation::{EvaluationDir, MARK, PREDICTIONS, Row, TABLE, markdown, prediction};
 use pcadlang::report::{RunDir, bytes_hash, r_hat_text, seconds};
 use serde_json::{Map, Value, json};
@@ -100,35 +101,33 @@ impl<'a> Evaluation<'a> {
     /// Everything that can be wrong with program, dataset or folder is said before the first case is run.
     fn prepare(a: &'a Evaluate) -> Result<Evaluation<'a>, Failure> {
         let Dataset { layout, cases, skipped } = Dataset::open(&a.dataset)?;
-        unknown_names(a, &cases)?;
+        dataset::known(&a.dataset, &a.only, cases.iter().map(|c| c.name.as_str()))?;
         let program = given::program(&a.given, a.quiet)?;
         let hash = program.hash();
         let detections = a.keypoints.clone().map(Detections::open).transpose()?;
         let items = Items::of(&program, detections.is_some())?;
         program.without_data().compile()?;
         let dir = EvaluationDir::open(&a.out).map_err(|e| plain(e.to_string()))?;
+        let mut said = None;
         let task = |case: Case| {
             let camera = case.camera.clone().or_else(|| a.given.camera.clone());
             let case = Case { camera: camera.clone(), ..case };
             let observe = observations_for(&case, detections.as_ref()).iter().map(|o| items.spec(o)).collect();
             let given = Given { camera, ..a.given.clone() };
-            let job = Job {
-                given,
-                observe,
-                observe_contours: None,
-                keypoints: None,
-                features_from: None,
-                sampling: a.sampling.clone(),
-            };
+            let mut job = Job { observe, ..Job::of(given, a.sampling.clone()) };
+            said = quality::apply(&mut job, detections.is_some())?;
             let inputs = bytes_hash(&observed::bytes(&case, detections.as_ref()));
             let record = job::record(&job, &hash, &inputs);
             let chosen = a.only.is_empty() || a.only.contains(&case.name);
-            Task { case, job, record, chosen, row: None }
+            Ok(Task { case, job, record, chosen, row: None })
         };
-        let tasks = cases.into_iter().map(task).collect();
+        let tasks = cases.into_iter().map(task).collect::<Result<_, Failure>>()?;
         let mut e = Evaluation { a, layout, dir, tasks, head: Map::new(), interrupt: Interrupt::listen() };
         e.take_up()?;
         e.head = e.head();
+        if let Some(said) = said {
+            e.say(&format!("note: {said}"));
+        }
         for name in skipped {
             e.say(&format!("note: {name} has no image and is left out"));
         }
@@ -255,21 +254,6 @@ impl<'a> Evaluation<'a> {
     fn say(&self, text: &str) {
         if !self.a.quiet {
             eprintln!("{text}");
-        }
-    }
-}
-
-/// Names of `--only` that are no case.
-fn unknown_names(a: &Evaluate, cases: &[Case]) -> Result<(), Failure> {
-    let names: Vec<&str> = cases.iter().map(|c| c.name.as_str()).collect();
-    match a.only.iter().find(|n| !names.contains(&n.as_str())) {
-        None => Ok(()),
-        Some(n) => {
-            let hint = match pcadlang::diag::nearest(n, names.iter().copied()) {
-                Some(near) => format!("did you mean `{near}`?"),
-                None => format!("there are {}", names.join(", ")),
-            };
-            Err(Failure::Plain(format!("{}: there is no case {n:?}", a.dataset.display()), Some(hint)))
         }
     }
 }

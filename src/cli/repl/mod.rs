@@ -57,15 +57,7 @@ fn open(a: &Repl, stop: Stop) -> Result<(Session, Reply), Failure> {
 
 /// What the program is given, as `run` has it.
 fn job(a: &Repl, path: &str) -> Job {
-    let sampling = Sampling {
-        seed: a.seed,
-        chains: 1,
-        threads: None,
-        steps: None,
-        warmup: None,
-        time: None,
-        no_incremental: false,
-    };
+    let sampling = Sampling { seed: a.seed, chains: Some(1), ..Sampling::default() };
     Job {
         given: Given {
             program: path.to_owned(),

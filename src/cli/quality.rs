@@ -1,0 +1,148 @@
+//! `--quality` and `--time`: settings that were chosen from a front of speed and accuracy, filled in where the command line leaves them open.
+//!
+//! Invariant: what is filled in is as if it had been typed, and depends on the command line and the presets alone, never on the machine.
+
+use super::args::{Job, QualityArg, Sampling};
+use super::{Failure, plain};
+use pcadlang::lang::load;
+use pcadlang::tradeoff::{Choice, Presets, Quality};
+use std::path::Path;
+use std::time::Duration;
+
+/// What is known of a program: `NAME.quality.json` beside it, or the shipped one of a shipped program.
+pub fn presets(program: &str) -> Result<Option<(String, Presets)>, Failure> {
+    let path = Path::new(program).with_extension("quality.json");
+    let name = path.display().to_string();
+    let text = match Path::new(program).exists() {
+        true => std::fs::read_to_string(&path).ok(),
+        false => load::embedded(&name).map(str::to_owned),
+    };
+    let read = |text: String| serde_json::from_str(&text).map_err(|e| plain(format!("{name}: {e}")));
+    text.map(read).transpose().map(|p| p.map(|p| (name, p)))
+}
+
+/// Fills in what a run leaves open; what is to be said of it, if anything was. `keypoints`: whether it, or the dataset it is of, has some.
+pub fn apply(job: &mut Job, keypoints: bool) -> Result<Option<String>, Failure> {
+    let program = &job.given.program;
+    let wanted = match (job.sampling.quality, job.sampling.time) {
+        (Some(QualityArg::Own), _) | (None, None) => return Ok(None),
+        (Some(QualityArg::Known(quality)), _) => Some(quality),
+        (None, Some(_)) => None,
+    };
+    let known = presets(program)?;
+    let Some(quality) = wanted else {
+        let Some((name, presets)) = known.filter(|(_, p)| fits(p, keypoints)) else { return Ok(None) };
+        let seconds = job.sampling.time.map_or(0.0, |t| t.as_secs_f64());
+        return Ok(presets.of_time(seconds).map(|choice| fill(job, &choice, &name)));
+    };
+    let Some((name, presets)) = known else {
+        let hint = "pcadlang tradeoff measures settings on cases with known answers; --presets writes the file";
+        return Err(Failure::Plain(
+            format!("nothing is known of the speed and accuracy of {program}"),
+            Some(hint.into()),
+        ));
+    };
+    if !fits(&presets, keypoints) {
+        let needs = presets.needs.join(", ");
+        return Err(plain(format!("what is known of {program} was measured with {needs}; --quality needs it")));
+    }
+    match presets.of_quality(quality) {
+        Some(choice) => Ok(Some(fill(job, &choice, &name))),
+        None => Err(plain(format!("{name} has no settings"))),
+    }
+}
+
+/// Whether a run is given what the presets were measured with.
+fn fits(presets: &Presets, keypoints: bool) -> bool {
+    presets.needs.iter().all(|kind| kind == "keypoints" && keypoints)
+}
+
+fn fill(job: &mut Job, choice: &Choice, name: &str) -> String {
+    let setting = &choice.preset.setting;
+    let mut said = Vec::new();
+    for (param, value) in &setting.set {
+        if !job.given.sets.iter().any(|(p, _)| p == param) {
+            job.given.sets.push((param.clone(), value.clone()));
+            said.push(format!("--set {param}={value}"));
+        }
+    }
+    let s = &mut job.sampling;
+    if let (None, Some(chains)) = (s.chains, setting.chains) {
+        s.chains = Some(chains);
+        said.push(format!("--chains {chains}"));
+    }
+    if let (None, None, Some(time)) = (s.time, s.steps, setting.time) {
+        s.time = Some(Duration::from_secs_f64(time));
+        said.push(format!("--time {time}s"));
+    }
+    let [low, high] = choice.preset.interval;
+    let (error, cases) = (choice.preset.error, choice.preset.cases);
+    format!(
+        "{}: {}, of {name} (error {error}, {low} to {high} over {cases} cases); --quality own runs the program as it is",
+        choice.wanted,
+        if said.is_empty() { "nothing to fill in".to_owned() } else { said.join(" ") },
+    )
+}
+
+/// A job with what it leaves open filled in; says so, unless it is to be quiet.
+pub fn filled(job: &Job, quiet: bool) -> Result<Job, Failure> {
+    let mut job = job.clone();
+    let keypoints = job.keypoints.is_some();
+    if let (Some(said), false) = (apply(&mut job, keypoints)?, quiet) {
+        eprintln!("note: {said}");
+    }
+    Ok(job)
+}
+
+/// How a run is told again: what is not in the program.
+pub fn again(job: &Job) -> String {
+    let sets = job.given.sets.iter().map(|(k, v)| format!(" --set {k}={v}"));
+    let chains = job.sampling.chains.filter(|n| *n != Sampling::CHAINS).map(|n| format!(" --chains {n}"));
+    sets.chain(chains).collect()
+}
+
+/// The names of qualities.
+pub fn names() -> Vec<&'static str> {
+    Quality::ALL.map(Quality::name).into_iter().chain(["own"]).collect()
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+    use crate::cli::args::Given;
+
+    fn job(quality: Option<QualityArg>, time: Option<f64>) -> Job {
+        let given = Given {
+            program: "x.pcad".into(),
+            sets: vec![("size".into(), "64".into())],
+            camera: None,
+            allowed: Default::default(),
+        };
+        Job::of(given, Sampling { quality, time: time.map(Duration::from_secs_f64), ..Sampling::default() })
+    }
+
+    #[test]
+    fn what_was_typed_stays() {
+        let text = r#"{"about": "", "error": "", "front": [
+            {"chains": 2, "time": 1, "set": {"size": "96", "keep": "4"}, "seconds": 1.1, "error": 0.3, "interval": [0.2, 0.4], "cases": 3}]}"#;
+        let presets: Presets = serde_json::from_str(text).unwrap();
+        let mut open = job(None, None);
+        let said = fill(&mut open, &presets.of_quality(Quality::Fast).unwrap(), "x.quality.json");
+        assert_eq!(open.given.sets, [("size".into(), "64".into()), ("keep".into(), "4".into())]);
+        assert_eq!((open.sampling.chains(), open.sampling.time), (2, Some(Duration::from_secs(1))));
+        assert!(said.starts_with(
+            "--quality fast: --set keep=4 --chains 2 --time 1s, of x.quality.json (error 0.3, 0.2 to 0.4"
+        ));
+        let mut told = job(None, Some(5.0));
+        told.sampling.chains = Some(3);
+        fill(&mut told, &presets.of_time(5.0).unwrap(), "x.quality.json");
+        assert_eq!((told.sampling.chains(), told.sampling.time), (3, Some(Duration::from_secs(5))));
+    }
+
+    #[test]
+    fn what_is_not_known_is_an_error_only_if_asked_for() {
+        assert!(apply(&mut job(Some(QualityArg::Known(Quality::Fast)), None), false).is_err());
+        assert!(apply(&mut job(None, Some(1.0)), false).unwrap_or_default().is_none());
+        assert!(apply(&mut job(Some(QualityArg::Own), None), false).unwrap_or_default().is_none());
+    }
+}

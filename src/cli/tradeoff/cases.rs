@@ -1,0 +1,89 @@
+//! Cases with a known answer: what a program is given of them, and the truth.
+//!
+//! Invariant: the truth reaches the scores only; what a run observes is what `evaluate` would give it.
+
+use super::truth::{self, Truth};
+use crate::cli::args::Tradeoff;
+use crate::cli::evaluate::{Dataset, Detections, Items, Layout, observations_for};
+use crate::cli::{Failure, files, plain};
+use pcadlang::Program;
+use std::path::{Path, PathBuf};
+
+/// A case.
+pub struct Case {
+    /// Its name.
+    pub name: String,
+    /// What is observed, as `--observe` takes it.
+    pub observe: Vec<String>,
+    /// Its camera.
+    pub camera: Option<PathBuf>,
+    /// The answer.
+    pub truth: Truth,
+}
+
+/// The posterior that a case without a picture is compared with.
+const REFERENCE: &str = "reference.json";
+
+/// All cases below a folder. What is observed is told by the interface of the program.
+pub fn open(a: &Tradeoff, program: &Program) -> Result<Vec<Case>, Failure> {
+    let folders = folders(&a.cases)?;
+    if folders.iter().any(|f| f.join(REFERENCE).is_file()) {
+        return folders.iter().filter(|f| f.join(REFERENCE).is_file()).map(|f| posterior(f, program)).collect();
+    }
+    let Dataset { layout, cases, .. } = Dataset::open(&a.cases)?;
+    let detections = a.keypoints.clone().map(Detections::open).transpose()?;
+    let items = Items::of(program, detections.is_some())?;
+    let mut truths = match layout {
+        Layout::People => Some(truth::people(&a.cases)?),
+        Layout::Folders => None,
+    };
+    let mut all = Vec::new();
+    for case in cases {
+        let found = match &mut truths {
+            Some(people) => people.shift_remove(&case.name).map(Truth::Joints),
+            None => truth::surface(&a.cases.join(&case.name), case.camera.as_deref())?.map(Truth::Surface),
+        };
+        let Some(truth) = found else { continue };
+        let observe = observations_for(&case, detections.as_ref()).iter().map(|o| items.spec(o)).collect();
+        all.push(Case { name: case.name, observe, camera: case.camera.or_else(|| a.given.camera.clone()), truth });
+    }
+    match all.is_empty() {
+        true => Err(Failure::Plain(
+            format!("{}: no case has a known answer", a.cases.display()),
+            Some(
+                "an answer is CASE/depth.npy or CASE/gt.npz, keypoints in annotations.json, or CASE/reference.json"
+                    .into(),
+            ),
+        )),
+        false => Ok(all),
+    }
+}
+
+/// The folders of a folder, by name.
+fn folders(path: &Path) -> Result<Vec<PathBuf>, Failure> {
+    let entries = std::fs::read_dir(path).map_err(|e| plain(format!("{}: {e}", path.display())))?;
+    let mut all: Vec<PathBuf> = entries.filter_map(|e| Some(e.ok()?.path())).filter(|p| p.is_dir()).collect();
+    all.sort();
+    Ok(all)
+}
+
+/// A case of any program: a file for each `data` item that has one, and the posterior.
+fn posterior(folder: &Path, program: &Program) -> Result<Case, Failure> {
+    let name = folder.file_name().and_then(|n| n.to_str()).unwrap_or("case").to_owned();
+    let data = program.interface().data;
+    let mut given: Vec<PathBuf> = std::fs::read_dir(folder)
+        .map_err(|e| plain(format!("{}: {e}", folder.display())))?
+        .filter_map(|e| Some(e.ok()?.path()))
+        .filter(|p| p.is_file())
+        .collect();
+    given.sort();
+    let item = |path: &PathBuf| {
+        let stem = path.file_stem()?.to_str()?;
+        data.iter().find(|d| d.name == stem).map(|d| format!("{}={}", d.name, path.display()))
+    };
+    let observe = given.iter().filter_map(item).collect();
+    let path = folder.join(REFERENCE);
+    let text = files::read(&path)?;
+    let truth = truth::reference(&text).map_err(|e| plain(format!("{}: {e}", path.display())))?;
+    Ok(Case { name, observe, camera: None, truth: Truth::Posterior(truth) })
+}

@@ -1,0 +1,86 @@
+//! The folder of a tradeoff: runs as they are done, and the table, front and plot made of them.
+//!
+//! Invariant: a run that is in the journal is whole; everything else is made from it again.
+
+use crate::cli::{Failure, plain};
+use pcadlang::report::write_file;
+use pcadlang::tradeoff::RunRecord;
+use serde_json::{Map, Value};
+use std::fs::File;
+use std::io::Write;
+use std::path::{Path, PathBuf};
+use std::sync::{Mutex, PoisonError};
+
+/// What marks a folder as one of a tradeoff, and says what was run.
+const MARK: &str = "tradeoff.json";
+/// One run a line.
+const JOURNAL: &str = "runs.jsonl";
+
+/// The folder.
+pub struct Folder {
+    path: PathBuf,
+    journal: Mutex<File>,
+    /// The runs that were there.
+    pub before: Vec<RunRecord>,
+    /// The seconds that they took of the budget.
+    pub spent: f64,
+}
+
+impl Folder {
+    /// Makes a folder, or takes one up in which the same was measured: what `head` says.
+    pub fn open(path: &Path, head: &Map<String, Value>, fresh: bool) -> Result<Folder, Failure> {
+        let fails = |e: std::io::Error| plain(format!("{}: {e}", path.display()));
+        std::fs::create_dir_all(path).map_err(fails)?;
+        let marked = std::fs::read(path.join(MARK)).ok().and_then(|b| serde_json::from_slice::<Value>(&b).ok());
+        let journal = path.join(JOURNAL);
+        let mut before = Vec::new();
+        let mut spent = 0.0;
+        match marked {
+            None if std::fs::read_dir(path).map_err(fails)?.next().is_some() => {
+                return Err(plain(format!(
+                    "{} holds something else; choose another folder with --out",
+                    path.display()
+                )));
+            }
+            Some(_) if fresh => std::fs::write(&journal, b"").map_err(fails)?,
+            Some(other) => {
+                if let Some((key, _)) = head.iter().find(|(k, v)| other[k.as_str()] != **v) {
+                    let hint = "choose another folder with --out, or measure everything anew with --fresh";
+                    let message = format!("{}: {key} is not what it was", path.display());
+                    return Err(Failure::Plain(message, Some(hint.into())));
+                }
+                let text = std::fs::read_to_string(&journal).unwrap_or_default();
+                // A line that an interruption cut off is not whole.
+                before = text.lines().filter_map(|l| serde_json::from_str(l).ok()).collect();
+                let whole: String = before.iter().map(line).collect();
+                std::fs::write(&journal, whole).map_err(fails)?;
+                spent = other["seconds"].as_f64().unwrap_or(0.0);
+            }
+            None => {}
+        }
+        let journal = File::options().create(true).append(true).open(&journal).map_err(fails)?;
+        Ok(Folder { path: path.to_owned(), journal: Mutex::new(journal), before, spent })
+    }
+
+    /// Keeps a run.
+    pub fn keep(&self, run: &RunRecord) -> Result<(), Failure> {
+        let mut journal = self.journal.lock().unwrap_or_else(PoisonError::into_inner);
+        let written = journal.write_all(line(run).as_bytes()).and_then(|()| journal.flush());
+        written.map_err(|e| plain(format!("{}: {e}", self.path.join(JOURNAL).display())))
+    }
+
+    /// Writes a file, whole or not at all.
+    pub fn write(&self, name: &str, bytes: &[u8]) -> Result<(), Failure> {
+        let path = self.path.join(name);
+        write_file(&path, bytes).map_err(|e| plain(format!("{}: {e}", path.display())))
+    }
+
+    /// Writes what was run, and all that is made of it.
+    pub fn mark(&self, head: Map<String, Value>) -> Result<(), Failure> {
+        self.write(MARK, &serde_json::to_vec_pretty(&Value::Object(head)).unwrap_or_default())
+    }
+}
+
+fn line(run: &RunRecord) -> String {
+    serde_json::to_string(run).unwrap_or_default() + "\n"
+}

@@ -1,0 +1,275 @@
+//! `pcadlang tradeoff`: what speed costs in accuracy, over settings and cases with known answers.
+//!
+//! Invariant: what has been run is on the disk before anything else is; table, front, plot and presets are made of that alone, so
+//! that an interrupted sitting and one that ran through write the same.
+
+mod cases;
+mod folder;
+mod running;
+mod truth;
+mod work;
+
+use super::args::{Given, Tradeoff};
+use super::evaluate::known;
+use super::job::{self, Interrupt};
+use super::{Failure, files, given, plain};
+use cases::Case;
+use folder::Folder;
+use pcadlang::lang::load;
+use pcadlang::report::{bytes_hash, seconds, text_hash};
+use pcadlang::tradeoff::{
+    Plan, Presets, Quality, Round, Row, RunRecord, Setting, plot, rounds, rows, survivors, to_csv,
+};
+use serde_json::{Map, Value, json};
+use std::collections::HashSet;
+use std::path::Path;
+use std::sync::atomic::{AtomicUsize, Ordering};
+use std::sync::{Mutex, PoisonError};
+use std::time::Instant;
+use work::Task;
+
+/// Threads of one run: the presets are for small machines.
+const THREADS: usize = 2;
+
+/// Everything there is to measure, and what has been.
+struct Sitting<'a> {
+    a: &'a Tradeoff,
+    settings: Vec<Setting>,
+    cases: Vec<Case>,
+    folder: Folder,
+    head: Map<String, Value>,
+    runs: Mutex<Vec<RunRecord>>,
+    begun: Instant,
+    jobs: usize,
+    threads: usize,
+}
+
+/// Measures.
+pub fn tradeoff(a: &Tradeoff) -> Result<(), Failure> {
+    let interrupt = Interrupt::listen();
+    let mut s = Sitting::prepare(a)?;
+    let each = s.settings.iter().map(|x| x.time.unwrap_or(10.0)).sum::<f64>() / s.settings.len().max(1) as f64;
+    let each = each * f64::from(a.seeds) / s.jobs as f64;
+    let plan = rounds(s.settings.len(), s.cases.len(), each, a.budget.as_secs_f64());
+    let (mut names, mut out_of_time) = (s.settings.iter().map(Setting::name).collect::<Vec<_>>(), false);
+    for (i, round) in plan.iter().enumerate() {
+        names = survivors(&names, &s.done(), round.settings);
+        let Round { settings, cases } = *round;
+        s.say(&format!("round {} of {}: {settings} settings on {cases} cases", i + 1, plan.len()));
+        out_of_time = !s.round(&names, cases, &interrupt)?;
+        s.write()?;
+        if out_of_time || interrupt.asked() {
+            break;
+        }
+    }
+    s.show();
+    match (interrupt.asked(), out_of_time) {
+        (true, _) => Err(Failure::Interrupted),
+        (_, true) => Err(Failure::Plain(
+            "the budget is used up before everything was run; what was is written".into(),
+            Some("run the same command with a larger --budget to go on".into()),
+        )),
+        _ => Ok(()),
+    }
+}
+
+impl<'a> Sitting<'a> {
+    /// Everything that can be wrong is said before the first run.
+    fn prepare(a: &'a Tradeoff) -> Result<Sitting<'a>, Failure> {
+        let program = given::program(&a.given, a.quiet)?;
+        let (file, text) = settings_of(a)?;
+        let read = Plan::from_json(&text).and_then(|p| p.settings());
+        let settings = read.map_err(|e| plain(format!("{file}: {e}")))?;
+        let mut hashes = Map::new();
+        for setting in &settings {
+            let name = setting.program.as_deref().unwrap_or(&a.given.program);
+            let given = Given { program: name.to_owned(), sets: Vec::new(), ..a.given.clone() };
+            let mut other = given::program(&given, true)?;
+            hashes.insert(name.to_owned(), json!(other.hash()));
+            for (param, value) in a.given.sets.iter().cloned().chain(setting.set.clone()) {
+                other = other.set(&param, &value);
+            }
+            other.without_data().compile()?;
+        }
+        let mut cases = cases::open(a, &program)?;
+        known(&a.cases, &a.only, cases.iter().map(|c| c.name.as_str()))?;
+        cases.retain(|c| a.only.is_empty() || a.only.contains(&c.name));
+        // The first few are to be of all kinds, whatever the names say.
+        cases.sort_by_key(|c| text_hash(&c.name));
+        let machine = job::machine_threads();
+        let threads = a.threads.map_or(THREADS.min(machine), |n| n as usize);
+        let jobs = a.jobs.map_or((machine / threads).max(1), |n| n as usize);
+        let inputs: String = cases.iter().flat_map(|c| &c.observe).map(|o| observed_hash(o)).collect();
+        let head = json!({
+            "version": env!("CARGO_PKG_VERSION"),
+            "program": a.given.program,
+            "programs": hashes,
+            "set": a.given.sets.iter().map(|(k, v)| (k.clone(), json!(v))).collect::<Map<_, _>>(),
+            "cases": cases.iter().map(|c| c.name.clone()).collect::<Vec<_>>(),
+            "inputs": text_hash(&inputs),
+            "threads": threads,
+            "jobs": jobs,
+            "machine_threads": machine,
+        });
+        let Value::Object(head) = head else { return Err(plain("no settings")) };
+        let folder = Folder::open(&a.out, &head, a.fresh)?;
+        let runs = Mutex::new(folder.before.clone());
+        let s = Sitting { a, settings, cases, folder, head, runs, begun: Instant::now(), jobs, threads };
+        s.write()?;
+        Ok(s)
+    }
+
+    /// All runs there are of the settings and cases of this sitting.
+    fn done(&self) -> Vec<RunRecord> {
+        let names: HashSet<String> = self.settings.iter().map(Setting::name).collect();
+        let cases: HashSet<&str> = self.cases.iter().map(|c| c.name.as_str()).collect();
+        let runs = self.runs.lock().unwrap_or_else(PoisonError::into_inner);
+        runs.iter().filter(|r| names.contains(&r.setting) && cases.contains(r.case.as_str())).cloned().collect()
+    }
+
+    /// Seconds of the budget that are used up.
+    fn spent(&self) -> f64 {
+        self.folder.spent + self.begun.elapsed().as_secs_f64()
+    }
+
+    /// Runs settings on the first of the cases, those that were not run before; whether the budget was enough.
+    fn round(&mut self, names: &[String], cases: usize, interrupt: &Interrupt) -> Result<bool, Failure> {
+        let known: HashSet<(String, String, u64)> =
+            self.done().into_iter().map(|r| (r.setting, r.case, r.seed)).collect();
+        let settings: Vec<&Setting> = self.settings.iter().filter(|s| names.contains(&s.name())).collect();
+        let mut tasks = Vec::new();
+        for case in &self.cases[..cases.min(self.cases.len())] {
+            for seed in 1..=u64::from(self.a.seeds) {
+                let new = |s: &&&Setting| !known.contains(&(s.name(), case.name.clone(), seed));
+                tasks.extend(settings.iter().filter(new).map(|setting| Task { setting, case, seed }));
+            }
+        }
+        let (next, done) = (AtomicUsize::new(0), AtomicUsize::new(0));
+        let failure: Mutex<Option<Failure>> = Mutex::default();
+        let over = || interrupt.asked() || self.spent() > self.a.budget.as_secs_f64();
+        std::thread::scope(|scope| {
+            for _ in 0..self.jobs.min(tasks.len()) {
+                scope.spawn(|| {
+                    while !over() {
+                        let Some(task) = tasks.get(next.fetch_add(1, Ordering::Relaxed)) else { break };
+                        let Some(run) = work::run(self.a, *task, self.threads as u32, interrupt) else { break };
+                        if let Err(e) = self.folder.keep(&run) {
+                            *failure.lock().unwrap_or_else(PoisonError::into_inner) = Some(e);
+                            break;
+                        }
+                        let n = done.fetch_add(1, Ordering::Relaxed) + 1;
+                        self.say(&format!("{n}/{} {}", tasks.len(), told(&run)));
+                        self.runs.lock().unwrap_or_else(PoisonError::into_inner).push(run);
+                    }
+                });
+            }
+        });
+        match failure.into_inner().unwrap_or_else(PoisonError::into_inner) {
+            Some(e) => Err(e),
+            None => Ok(done.into_inner() == tasks.len()),
+        }
+    }
+
+    /// The table of all that was run.
+    fn rows(&self) -> Vec<Row> {
+        rows(&self.settings, &self.done(), self.cases.len())
+    }
+
+    fn error_name(&self) -> &'static str {
+        self.cases.first().map_or("error", |c| c.truth.error_name())
+    }
+
+    fn presets(&self, rows: &[Row]) -> Presets {
+        let about = format!(
+            "the front of {} settings on {} cases, {} threads a run; chosen by pcadlang tradeoff",
+            self.settings.len(),
+            self.cases.len(),
+            self.threads,
+        );
+        let needs = if self.a.keypoints.is_some() { vec!["keypoints".to_owned()] } else { Vec::new() };
+        Presets::of(&self.settings, rows, about, self.error_name().into(), needs)
+    }
+
+    /// Writes everything that is made of the runs.
+    fn write(&self) -> Result<(), Failure> {
+        let (rows, mut head) = (self.rows(), self.head.clone());
+        let presets = self.presets(&rows);
+        head.insert("seconds".into(), json!(self.spent()));
+        head.insert("error".into(), json!(self.error_name()));
+        head.insert("rows".into(), json!(rows));
+        self.folder.mark(head)?;
+        self.folder.write("table.csv", to_csv(&rows).as_bytes())?;
+        let named: Vec<(String, String)> = Quality::ALL
+            .iter()
+            .filter_map(|q| Some((presets.of_quality(*q)?.preset.setting.name(), q.name().to_owned())))
+            .collect();
+        self.folder.write("plot.svg", plot(&rows, self.error_name(), &named).as_bytes())?;
+        let text = serde_json::to_vec_pretty(&presets).unwrap_or_default();
+        if let Some(path) = &self.a.presets
+            && !presets.front.is_empty()
+        {
+            pcadlang::report::write_file(path, &text).map_err(|e| plain(format!("{}: {e}", path.display())))?;
+        }
+        Ok(())
+    }
+
+    /// The front, and what was chosen from it.
+    fn show(&self) {
+        if self.a.quiet {
+            return;
+        }
+        let rows = self.rows();
+        let presets = self.presets(&rows);
+        println!("the front, error: {}", self.error_name());
+        for p in &presets.front {
+            let [low, high] = p.interval;
+            println!("{:>9}  {:.4} ({low:.4} to {high:.4})  {}", seconds(p.seconds), p.error, p.setting.name());
+        }
+        for q in Quality::ALL {
+            if let Some(c) = presets.of_quality(q) {
+                println!("{:>9}: {}", q.name(), c.preset.setting.name());
+            }
+        }
+        println!("{}", self.a.out.display());
+    }
+
+    fn say(&self, text: &str) {
+        if !self.a.quiet {
+            eprintln!("{text}");
+        }
+    }
+}
+
+/// A run in one line.
+fn told(run: &RunRecord) -> String {
+    let end = match (&run.failed, run.error_at(None)) {
+        (Some(failed), _) => format!("failed: {}", failed.lines().next().unwrap_or_default()),
+        (None, Some(error)) => format!("{error:.4}"),
+        (None, None) => "nothing to score".into(),
+    };
+    format!("{} on {}: {end}", run.setting, run.case)
+}
+
+/// The file of settings: the one that is named, or the program's own, `NAME.settings.json`.
+fn settings_of(a: &Tradeoff) -> Result<(String, String), Failure> {
+    if let Some(path) = &a.settings {
+        let text = String::from_utf8(files::read(path)?).map_err(|_| plain(format!("{}: not text", path.display())))?;
+        return Ok((path.display().to_string(), text));
+    }
+    let name = Path::new(&a.given.program).with_extension("settings.json").display().to_string();
+    match std::fs::read_to_string(&name).ok().or_else(|| load::embedded(&name).map(str::to_owned)) {
+        Some(text) => Ok((name, text)),
+        None => Err(Failure::Plain(
+            format!("{name} is not there, so it is not known which settings to try"),
+            Some(
+                r#"write one and name it by --settings: {"cross": {"time": [1, 3]}, "vary": {"chains": [1, 2]}}"#
+                    .into(),
+            ),
+        )),
+    }
+}
+
+/// A hash of the file that `NAME=FILE` or `NAME=FILE#ID` names.
+fn observed_hash(spec: &str) -> String {
+    std::fs::read(given::file_of(spec)).map(|b| bytes_hash(&b)).unwrap_or_default()
+}

@@ -1,0 +1,190 @@
+//! One run of one setting on one case, looked at while it runs and scored afterwards.
+
+use super::cases::Case;
+use super::running::{Running, Sums};
+use super::truth::Truth;
+use crate::cli::args::{Given, Job, QualityArg, Sampling, Tradeoff};
+use crate::cli::job::{self, Interrupt, Ready};
+use crate::cli::keypoints::Joints;
+use crate::cli::progress::Ending;
+use crate::cli::{Failure, scene};
+use indexmap::IndexMap;
+use pcadlang::infer::draws::Sink;
+use pcadlang::infer::{BestSoFar, BestState, Progress, Watch, Watches};
+use pcadlang::lang::builtins::scene::ViewValue;
+use pcadlang::render::View;
+use pcadlang::report::{Memory, Moments, Tee, quantities};
+use pcadlang::score::Surface;
+use pcadlang::trace::Trace;
+use pcadlang::tradeoff::{Mark, RunRecord, Setting, marks};
+use std::sync::Arc;
+use std::time::{Duration, Instant};
+
+/// The numbers kept of the draws of a chain, for effective sample sizes.
+const ROOM: usize = 1 << 20;
+
+/// What there was of an answer at a time.
+struct Snapshot {
+    at: Option<f64>,
+    seconds: f64,
+    best: Option<Arc<BestState>>,
+    joints: Moments,
+    sums: Sums,
+}
+
+/// What is looked at while chains run.
+struct Watched {
+    begun: Instant,
+    best: Arc<BestSoFar>,
+    joints: Joints,
+    running: Vec<Running>,
+}
+
+impl Watched {
+    fn look(&self, at: Option<f64>) -> Snapshot {
+        let mut sums = Sums::default();
+        self.running.iter().for_each(|r| sums.merge(&r.sums()));
+        let seconds = self.begun.elapsed().as_secs_f64();
+        Snapshot { at, seconds, best: self.best.state(), joints: self.joints.moments(), sums }
+    }
+}
+
+/// What is to be run.
+#[derive(Clone, Copy)]
+pub struct Task<'a> {
+    /// The setting.
+    pub setting: &'a Setting,
+    /// The case.
+    pub case: &'a Case,
+    /// The seed.
+    pub seed: u64,
+}
+
+/// Runs a task on so many threads. A program that fails gives a record that says so; an interrupt gives none.
+pub fn run(a: &Tradeoff, task: Task, threads: u32, interrupt: &Interrupt) -> Option<RunRecord> {
+    let Task { setting, case, seed } = task;
+    let record = RunRecord { setting: setting.name(), case: case.name.clone(), seed, ..RunRecord::default() };
+    match measure(a, task, threads, interrupt, record.clone()) {
+        _ if interrupt.asked() => None,
+        Ok(record) => Some(record),
+        Err(failure) => Some(RunRecord { failed: Some(failure.to_string()), ..record }),
+    }
+}
+
+/// What `pcadlang run` would be told.
+fn job(a: &Tradeoff, Task { setting, case, seed }: Task, threads: u32) -> Job {
+    let set = setting.set.iter().map(|(k, v)| (k.clone(), v.clone()));
+    let given = Given {
+        program: setting.program.clone().unwrap_or_else(|| a.given.program.clone()),
+        sets: a.given.sets.iter().cloned().chain(set).collect(),
+        camera: case.camera.clone(),
+        allowed: a.given.allowed.clone(),
+    };
+    let sampling = Sampling {
+        seed,
+        chains: setting.chains,
+        quality: Some(QualityArg::Own),
+        threads: Some(threads),
+        steps: setting.steps,
+        warmup: setting.warmup,
+        time: setting.time.map(Duration::from_secs_f64),
+        no_incremental: false,
+    };
+    Job { observe: case.observe.clone(), ..Job::of(given, sampling) }
+}
+
+fn measure(
+    a: &Tradeoff,
+    task: Task,
+    threads: u32,
+    interrupt: &Interrupt,
+    mut record: RunRecord,
+) -> Result<RunRecord, Failure> {
+    let job = job(a, task, threads);
+    let begun = Instant::now();
+    let ready = job::prepare(&job, true)?;
+    let chains = job.sampling.chains();
+    let progress = Arc::new(Progress::default());
+    let watched = Watched {
+        begun,
+        best: Arc::new(BestSoFar::new(chains, &progress)),
+        joints: Joints::new(chains, ready.size()),
+        running: (0..chains).map(|_| Running::default()).collect(),
+    };
+    let mut watches: Vec<Arc<dyn Watch>> = vec![watched.best.clone()];
+    if matches!(task.case.truth, Truth::Joints(_)) {
+        watches.push(Arc::new(watched.joints.clone()));
+    }
+    let options = job::options(&job, &ready, Some(Arc::new(Watches(watches))));
+    let memories: Vec<Memory> = (0..chains).map(|_| Memory::bounded(ROOM)).collect();
+    let sink = |(r, m): (&Running, &Memory)| -> Box<dyn Sink> {
+        Box::new(Tee(vec![Box::new(r.clone()), Box::new(m.clone())]))
+    };
+    let sinks = watched.running.iter().zip(&memories).map(sink).collect();
+    interrupt.ends(&progress);
+    let (ending, times) = (Ending::default(), marks(task.setting.time));
+    let (results, mut snapshots) = std::thread::scope(|scope| {
+        let looking = scope.spawn(|| {
+            let ahead = |t: f64| Duration::from_secs_f64(t).saturating_sub(begun.elapsed());
+            let looks = times.iter().map_while(|&t| (!ending.within(ahead(t))).then(|| watched.look(Some(t))));
+            looks.collect::<Vec<_>>()
+        });
+        let results = ready.model.run_into(&options, threads as usize, &progress, sinks);
+        ending.end();
+        (results, looking.join().unwrap_or_default())
+    });
+    snapshots.push(watched.look(None));
+    let chains = results?.into_iter().collect::<Result<Vec<_>, _>>().map_err(|e| ready.model.chain_error(e))?;
+    record.steps = chains.iter().map(|c| c.steps + c.warmup).sum();
+    if let Truth::Posterior(reference) = &task.case.truth {
+        let draws: Vec<_> = memories.iter().map(Memory::draws).collect();
+        let of = quantities(&draws).into_iter().filter(|q| reference.quantities.contains_key(&q.name));
+        let smallest = of.map(|q| q.summary.ess_bulk).filter(|e| e.is_finite()).min_by(f64::total_cmp);
+        let seconds = snapshots.last().map_or(f64::NAN, |s| s.seconds);
+        record.ess_per_second = smallest.map(|ess| ess / seconds);
+    }
+    for s in &snapshots {
+        record.scores = scores(&task.case.truth, &ready, s, &watched.joints);
+        let error = record.scores.get("error").copied();
+        record.marks.push(Mark { at: s.at, seconds: s.seconds, error });
+    }
+    Ok(record)
+}
+
+/// Everything that can be said of an answer, `error` first.
+fn scores(truth: &Truth, ready: &Ready, s: &Snapshot, joints: &Joints) -> IndexMap<String, f64> {
+    let all: Vec<(&str, f64)> = match truth {
+        Truth::Surface(truth) => {
+            let found = best_view(ready, s).map(|view| {
+                let frame =
+                    view.frame(ready.size().map_or(view.camera().width.max(view.camera().height), |(w, h)| w.max(h)));
+                Surface { width: frame.width as usize, depth: frame.depth.clone(), normal: frame.normal.clone() }
+            });
+            let e = truth.error(found.as_ref());
+            vec![("error", e.z_mae_u), ("z_mae", e.z_mae), ("n_mse", e.n_mse), ("n_mse_u", e.n_mse_u), ("iou", e.iou)]
+        }
+        Truth::Joints(truth) => {
+            let mut found: IndexMap<String, [f64; 2]> =
+                s.joints.iter().map(|(name, p)| (name.to_owned(), p.mean)).collect();
+            // Before the first draw the best state speaks.
+            if let Some(view) = best_view(ready, s).filter(|_| found.is_empty()) {
+                let at = joints.positions(&ViewValue(view)).into_iter();
+                found = at.filter_map(|(name, at)| Some((name.to_string(), at?))).collect();
+            }
+            let e = truth.error(&found);
+            let share = e.missed as f64 / e.labelled.max(1) as f64;
+            vec![("error", share), ("pixels", e.pixels), ("joints", e.labelled as f64), ("missed", e.missed as f64)]
+        }
+        Truth::Posterior(truth) => vec![("error", truth.error(&s.sums.normals()))],
+    };
+    all.into_iter().filter(|(_, x)| x.is_finite()).map(|(k, x)| (k.to_owned(), x)).collect()
+}
+
+/// What the best state shows.
+fn best_view(ready: &Ready, s: &Snapshot) -> Option<Arc<View>> {
+    let best = s.best.as_ref()?;
+    let draws = scene::predictive(1, 0);
+    let (code, limits) = (Arc::clone(ready.model.code()), ready.model.limits().clone());
+    let (mut trace, _) = Trace::generate(code, best.choices.iter().cloned(), draws, limits).ok()?;
+    scene::view(&mut trace, draws, None)
+}

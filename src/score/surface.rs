@@ -1,0 +1,174 @@
+//! A visible surface against the true one, in a picture of both (the measures of Kulkarni et al. 2014, section 3.1, after Barron
+//! and Malik 2013).
+
+/// What is seen in each pixel, row by row from the top.
+#[derive(Clone, Debug, Default, PartialEq)]
+pub struct Surface {
+    /// Pixels across.
+    pub width: usize,
+    /// Distance along the viewing axis in scene units; not finite, or not above 0, where nothing is seen.
+    pub depth: Vec<f32>,
+    /// Unit normals; x right, y up, z towards the camera. Looked at only where something is seen.
+    pub normal: Vec<[f32; 3]>,
+}
+
+impl Surface {
+    fn seen(&self, i: usize) -> Option<f64> {
+        let z = f64::from(*self.depth.get(i)?);
+        (z.is_finite() && z > 0.0).then_some(z)
+    }
+
+    /// Width and height of what is seen, in scene units, at its mean depth; `pixel` is the width of a pixel at a depth.
+    pub fn extent(&self, pixel: impl Fn(f64) -> f64) -> (f64, f64) {
+        let w = self.width.max(1);
+        let seen: Vec<(usize, f64)> = (0..self.depth.len()).filter_map(|i| Some((i, self.seen(i)?))).collect();
+        let span = |of: fn(usize, usize) -> usize| {
+            let at = seen.iter().map(|(i, _)| of(*i, w));
+            at.clone().max().zip(at.min()).map_or(0.0, |(hi, lo)| (hi - lo + 1) as f64)
+        };
+        let mean = seen.iter().map(|(_, z)| z).sum::<f64>() / seen.len().max(1) as f64;
+        let pixel = pixel(mean);
+        (span(|i, w| i % w) * pixel, span(|i, w| i / w) * pixel)
+    }
+}
+
+/// A true surface.
+#[derive(Clone, Debug, PartialEq)]
+pub struct SurfaceTruth {
+    /// What is to be seen.
+    pub surface: Surface,
+    /// The object's height along its axis in scene units: the unit of depth errors.
+    pub height: f64,
+    /// Its width in scene units; half of it is what a pixel in only one of two masks costs.
+    pub width: f64,
+}
+
+/// How far a surface is from the true one. "Both" are the pixels where both are, "either" those where one of them is.
+#[derive(Clone, Copy, Debug, PartialEq)]
+pub struct SurfaceError {
+    /// Mean absolute difference of depth over both, up to one shift of all depths, in object heights. NaN if there are none.
+    pub z_mae: f64,
+    /// The same over either, a pixel of only one at the cost of the object's half width: a small safe answer does not win.
+    pub z_mae_u: f64,
+    /// Mean squared distance of unit normals over both. NaN if there are none.
+    pub n_mse: f64,
+    /// The same over either, a pixel of only one at 2, as if the normals were orthogonal.
+    pub n_mse_u: f64,
+    /// Both by either.
+    pub iou: f64,
+}
+
+impl SurfaceTruth {
+    /// How far an answer is off; none (`None`) is as one that nowhere meets the truth. An answer of another size is read at the nearest pixel.
+    pub fn error(&self, found: Option<&Surface>) -> SurfaceError {
+        let truth = &self.surface;
+        let rows = |s: &Surface| s.depth.len() / s.width.max(1);
+        let (mut both, mut either, mut only_truth) = (Vec::new(), 0usize, 0usize);
+        for i in 0..truth.depth.len() {
+            let there = found.filter(|f| !f.depth.is_empty()).map(|f| {
+                let (x, y) = (i % truth.width.max(1), i / truth.width.max(1));
+                let across = x * f.width / truth.width.max(1);
+                (f, y * rows(f) / rows(truth).max(1) * f.width + across)
+            });
+            match (truth.seen(i), there.and_then(|(f, j)| Some((f, j, f.seen(j)?)))) {
+                (Some(z), Some((f, j, found))) => both.push((z - found, normal_gap(truth, i, f, j))),
+                (Some(_), None) => only_truth += 1,
+                (None, Some(_)) => either += 1,
+                (None, None) => {}
+            }
+        }
+        let only = (either + only_truth) as f64;
+        let n = both.len() as f64;
+        let half = self.width / 2.0;
+        if both.is_empty() {
+            let (z_mae, n_mse) = (f64::NAN, f64::NAN);
+            return SurfaceError { z_mae, z_mae_u: half / self.height, n_mse, n_mse_u: 2.0, iou: 0.0 };
+        }
+        let mut gaps: Vec<f64> = both.iter().map(|b| b.0).collect();
+        let shift = median(&mut gaps);
+        let depth: f64 = both.iter().map(|(gap, _)| (gap - shift).abs()).sum();
+        let normals: f64 = both.iter().map(|b| b.1).sum();
+        SurfaceError {
+            z_mae: depth / n / self.height,
+            z_mae_u: (depth + only * half) / (n + only) / self.height,
+            n_mse: normals / n,
+            n_mse_u: (normals + 2.0 * only) / (n + only),
+            iou: n / (n + only),
+        }
+    }
+}
+
+/// The squared distance of two unit normals; 2, as if they were orthogonal, where one is missing.
+fn normal_gap(a: &Surface, i: usize, b: &Surface, j: usize) -> f64 {
+    let unit = |s: &Surface, i: usize| {
+        let n = s.normal.get(i)?.map(f64::from);
+        let length = n.iter().map(|x| x * x).sum::<f64>().sqrt();
+        (length.is_finite() && length > 0.0).then(|| n.map(|x| x / length))
+    };
+    match (unit(a, i), unit(b, j)) {
+        (Some(x), Some(y)) => (0..3).map(|k| (x[k] - y[k]) * (x[k] - y[k])).sum(),
+        _ => 2.0,
+    }
+}
+
+/// The middle number, or the mean of the middle two.
+fn median(xs: &mut [f64]) -> f64 {
+    xs.sort_by(f64::total_cmp);
+    let n = xs.len();
+    if n == 0 { f64::NAN } else { (xs[(n - 1) / 2] + xs[n / 2]) / 2.0 }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    fn truth() -> SurfaceTruth {
+        let depth = vec![0.0, 5.0, 6.0, 0.0, 5.0, 7.0];
+        let surface = Surface { width: 3, depth, normal: vec![[0.0, 0.0, 1.0]; 6] };
+        SurfaceTruth { surface, height: 2.0, width: 1.0 }
+    }
+
+    #[test]
+    fn the_truth_is_without_error_wherever_along_the_axis() {
+        let t = truth();
+        let mut found = t.surface.clone();
+        found.depth.iter_mut().filter(|z| **z > 0.0).for_each(|z| *z += 1.5);
+        let e = t.error(Some(&found));
+        assert_eq!((e.z_mae, e.z_mae_u, e.n_mse, e.n_mse_u, e.iou), (0.0, 0.0, 0.0, 0.0, 1.0));
+    }
+
+    #[test]
+    fn errors_by_hand() {
+        let t = truth();
+        // One pixel off by 1, one missing, one too many, one normal turned by a right angle.
+        let mut found = t.surface.clone();
+        found.depth = vec![4.0, 5.0, 7.0, f32::INFINITY, 5.0, f32::NAN];
+        found.normal[1] = [2.0, 0.0, 0.0];
+        let e = t.error(Some(&found));
+        let close = |a: f64, b: f64| assert!((a - b).abs() < 1e-12, "{a} is not {b}");
+        close(e.z_mae, 1.0 / 3.0 / 2.0);
+        close(e.z_mae_u, (1.0 + 2.0 * 0.5) / 5.0 / 2.0);
+        close(e.n_mse, 2.0 / 3.0);
+        close(e.n_mse_u, (2.0 + 4.0) / 5.0);
+        close(e.iou, 0.6);
+        let none = t.error(None);
+        assert!(none.z_mae.is_nan());
+        assert_eq!((none.z_mae_u, none.n_mse_u, none.iou), (0.25, 2.0, 0.0));
+        assert_eq!(t.error(Some(&Surface::default())).z_mae_u, 0.25);
+    }
+
+    #[test]
+    fn other_sizes_are_read_at_the_nearest_pixel() {
+        let t = truth();
+        let twice = |row: &[f32]| row.iter().flat_map(|z| [*z, *z]).collect::<Vec<f32>>();
+        let rows: Vec<f32> = t.surface.depth.chunks(3).flat_map(|r| [twice(r), twice(r)].concat()).collect();
+        let found = Surface { width: 6, depth: rows, normal: vec![[0.0, 0.0, 1.0]; 24] };
+        assert_eq!(t.error(Some(&found)).z_mae_u, 0.0);
+    }
+
+    #[test]
+    fn extents_are_in_scene_units() {
+        let (width, height) = truth().surface.extent(|z| 0.1 * z);
+        assert!((width - 2.0 * 0.1 * 5.75).abs() < 1e-12 && (height - width).abs() < 1e-12);
+    }
+}

@@ -1,0 +1,110 @@
+//! Successive halving (Jamieson and Talwalkar 2016): all settings on few cases, the better half of them on more, until a few are left
+//! that have been through all cases.
+
+use super::runs::RunRecord;
+use indexmap::IndexMap;
+
+/// Some settings on some cases.
+#[derive(Clone, Copy, Debug, PartialEq, Eq)]
+pub struct Round {
+    /// How many settings are in it.
+    pub settings: usize,
+    /// On how many cases, those of earlier rounds included.
+    pub cases: usize,
+}
+
+/// The rounds that the budget is enough for: one of everything if it is, else as few as it takes. `each` is what a setting takes on one
+/// case on average, in seconds of the whole machine.
+pub fn rounds(settings: usize, cases: usize, each: f64, budget: f64) -> Vec<Round> {
+    let most = cases.max(1).ilog2() as usize + 1;
+    let of = |n: usize| -> Vec<Round> {
+        (0..n)
+            .map(|i| Round {
+                settings: settings.div_ceil(1 << i),
+                // Not fewer than three where there are as many: one or two say little.
+                cases: if i + 1 == n { cases } else { cases.div_ceil(1 << (n - 1 - i)).max(cases.min(3)) },
+            })
+            .collect()
+    };
+    (1..=most).map(of).find(|r| runs_of(r) as f64 * each <= budget).unwrap_or_else(|| of(most))
+}
+
+/// The number of runs.
+fn runs_of(rounds: &[Round]) -> usize {
+    let before = |i: usize| if i == 0 { 0 } else { rounds[i - 1].cases };
+    rounds.iter().enumerate().map(|(i, r)| r.settings * (r.cases.saturating_sub(before(i)))).sum()
+}
+
+/// The settings that go on: those that come first at some time. A setting is as good as its best rank over all times at which it was looked
+/// at, among the settings that were too; of equals, the one of smaller mean rank.
+pub fn survivors(settings: &[String], runs: &[RunRecord], keep: usize) -> Vec<String> {
+    // Errors by time and setting.
+    let mut errors: IndexMap<i64, IndexMap<&str, Vec<f64>>> = IndexMap::new();
+    for run in runs.iter().filter(|r| settings.contains(&r.setting)) {
+        for mark in &run.marks {
+            // The end of a run competes at the last time before it.
+            let at = mark.at.unwrap_or(mark.seconds);
+            let time = (at.max(1e-3).log10() * 4.0).round() as i64;
+            let errors = errors.entry(time).or_default().entry(&run.setting).or_default();
+            errors.extend(mark.error);
+        }
+    }
+    let mut ranks: IndexMap<&str, Vec<usize>> = settings.iter().map(|s| (s.as_str(), Vec::new())).collect();
+    for at in errors.values() {
+        let mean = |xs: &Vec<f64>| if xs.is_empty() { f64::INFINITY } else { xs.iter().sum::<f64>() / xs.len() as f64 };
+        let mut order: Vec<(&str, f64)> = at.iter().map(|(s, xs)| (*s, mean(xs))).collect();
+        order.sort_by(|a, b| a.1.total_cmp(&b.1));
+        for (rank, (setting, error)) in order.iter().enumerate() {
+            // Equal errors have equal ranks.
+            let first = order.iter().position(|o| o.1 == *error).unwrap_or(rank);
+            if let Some(all) = ranks.get_mut(setting) {
+                all.push(first);
+            }
+        }
+    }
+    let value = |all: &Vec<usize>| {
+        let mean = all.iter().sum::<usize>() as f64 / all.len().max(1) as f64;
+        (all.iter().copied().min().unwrap_or(usize::MAX), mean)
+    };
+    let mut order: Vec<(&str, (usize, f64))> = ranks.iter().map(|(s, all)| (*s, value(all))).collect();
+    order.sort_by(|a, b| a.1.0.cmp(&b.1.0).then(a.1.1.total_cmp(&b.1.1)));
+    let kept: Vec<&str> = order.into_iter().take(keep).map(|o| o.0).collect();
+    settings.iter().filter(|s| kept.contains(&s.as_str())).cloned().collect()
+}
+
+#[cfg(test)]
+mod tests {
+    use super::super::runs::Mark;
+    use super::*;
+
+    #[test]
+    fn rounds_fit_the_budget() {
+        assert_eq!(rounds(40, 10, 1.0, 400.0), [Round { settings: 40, cases: 10 }]);
+        let r = rounds(40, 10, 1.0, 320.0);
+        assert_eq!(r, [Round { settings: 40, cases: 5 }, Round { settings: 20, cases: 10 }]);
+        assert_eq!(runs_of(&r), 300);
+        let three =
+            [Round { settings: 40, cases: 3 }, Round { settings: 20, cases: 5 }, Round { settings: 10, cases: 10 }];
+        assert_eq!(rounds(40, 10, 1.0, 250.0), three);
+        assert_eq!(rounds(3, 1, 1.0, 0.1), [Round { settings: 3, cases: 1 }], "what does not fit is left to the clock");
+    }
+
+    #[test]
+    fn whoever_is_first_at_some_time_goes_on() {
+        let run = |setting: &str, errors: &[(f64, f64)]| RunRecord {
+            setting: setting.into(),
+            marks: errors.iter().map(|(t, e)| Mark { at: Some(*t), seconds: *t, error: Some(*e) }).collect(),
+            ..RunRecord::default()
+        };
+        let runs = [
+            run("early", &[(0.1, 0.5), (1.0, 0.5)]),
+            run("late", &[(0.1, 0.9), (1.0, 0.1)]),
+            run("never", &[(0.1, 0.6), (1.0, 0.4)]),
+            run("worst", &[(0.1, 1.0), (1.0, 1.0)]),
+        ];
+        let all: Vec<String> = ["worst", "never", "early", "late"].map(String::from).to_vec();
+        assert_eq!(survivors(&all, &runs, 2), ["early", "late"]);
+        assert_eq!(survivors(&all, &runs, 3), ["never", "early", "late"]);
+        assert_eq!(survivors(&all, &[], 4), all);
+    }
+}

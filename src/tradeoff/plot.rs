@@ -1,0 +1,186 @@
+//! Error against seconds as a picture.
+//!
+//! Invariant: only finite numbers are written, whatever the rows are.
+
+use super::rows::Row;
+use std::fmt::Write;
+
+const WIDTH: f64 = 760.0;
+const HEIGHT: f64 = 460.0;
+/// Room for the labels at the left and the bottom, and little at the other sides.
+const LEFT: f64 = 58.0;
+const BOTTOM: f64 = 40.0;
+const EDGE: f64 = 16.0;
+
+/// Where numbers are in the picture.
+struct Axes {
+    /// Powers of ten.
+    time: (f64, f64),
+    top: f64,
+}
+
+impl Axes {
+    fn x(&self, seconds: f64) -> f64 {
+        let share = (seconds.log10() - self.time.0) / (self.time.1 - self.time.0);
+        LEFT + share.clamp(0.0, 1.0) * (WIDTH - LEFT - EDGE)
+    }
+
+    fn y(&self, error: f64) -> f64 {
+        HEIGHT - BOTTOM - (error / self.top).clamp(0.0, 1.0) * (HEIGHT - BOTTOM - EDGE)
+    }
+}
+
+/// A plot as SVG: a thin line for each setting over time, its end as a dot with its interval, and the front in colour. `error` says
+/// what the error is; `named` are settings to label, such as presets, with their labels.
+pub fn plot(rows: &[Row], error: &str, named: &[(String, String)]) -> String {
+    let shown: Vec<&Row> =
+        rows.iter().filter(|r| r.seconds > 0.0 && [r.seconds, r.error].iter().all(|x| x.is_finite())).collect();
+    let seconds = || shown.iter().map(|r| r.seconds.log10());
+    let (low, high) = (seconds().fold(f64::INFINITY, f64::min), seconds().fold(f64::NEG_INFINITY, f64::max));
+    let (low, high) = if low < high { (low - 0.05, high + 0.05) } else { (-1.0, 1.0) };
+    let top = shown.iter().map(|r| if r.high.is_finite() { r.high } else { r.error }).fold(1e-9, f64::max) * 1.02;
+    let axes = Axes { time: (low, high), top };
+    let mut s = format!(
+        "<svg xmlns=\"http://www.w3.org/2000/svg\" viewBox=\"0 0 {WIDTH} {HEIGHT}\" width=\"{WIDTH}\" height=\"{HEIGHT}\" \
+         font-family=\"system-ui, sans-serif\" font-size=\"12\"><rect width=\"{WIDTH}\" height=\"{HEIGHT}\" fill=\"#fff\"/>\n"
+    );
+    grid(&mut s, &axes, error);
+    let names = || {
+        let mut names: Vec<&str> = shown.iter().map(|r| r.setting.as_str()).collect();
+        names.dedup();
+        names
+    };
+    for name in names() {
+        let line: Vec<String> = shown
+            .iter()
+            .filter(|r| r.setting == name)
+            .map(|r| format!("{:.1},{:.1}", axes.x(r.seconds), axes.y(r.error)))
+            .collect();
+        let _ = writeln!(
+            s,
+            "<polyline points=\"{}\" fill=\"none\" stroke=\"#bbb\" stroke-width=\"0.8\"><title>{}</title></polyline>",
+            line.join(" "),
+            text(name)
+        );
+    }
+    let ends: Vec<&&Row> = shown.iter().filter(|r| r.end).collect();
+    for r in &ends {
+        let (colour, width) = if r.front { ("#d55e00", 1.6) } else { ("#999", 0.6) };
+        let (x, y) = (axes.x(r.seconds), axes.y(r.error));
+        if r.low.is_finite() && r.high.is_finite() {
+            let (low, high) = (axes.y(r.low), axes.y(r.high));
+            let _ = write!(s, "<path d=\"M{x:.1},{low:.1}V{high:.1}\" stroke=\"{colour}\" stroke-width=\"{width}\"/>");
+        }
+        let radius = if r.front { 4.0 } else { 2.0 };
+        let title = format!("{}: {:.3} ({:.3} to {:.3}) after {:.2} s", r.setting, r.error, r.low, r.high, r.seconds);
+        let _ = writeln!(
+            s,
+            "<circle cx=\"{x:.1}\" cy=\"{y:.1}\" r=\"{radius}\" fill=\"{colour}\"><title>{}</title></circle>",
+            text(&title)
+        );
+    }
+    let mut front: Vec<(f64, f64)> = ends.iter().filter(|r| r.front).map(|r| (r.seconds, r.error)).collect();
+    front.sort_by(|a, b| a.0.total_cmp(&b.0));
+    let points: Vec<String> = front.iter().map(|(t, e)| format!("{:.1},{:.1}", axes.x(*t), axes.y(*e))).collect();
+    let _ = writeln!(
+        s,
+        "<polyline points=\"{}\" fill=\"none\" stroke=\"#d55e00\" stroke-width=\"1.6\"/>",
+        points.join(" ")
+    );
+    for (setting, label) in named {
+        if let Some(r) = ends.iter().find(|r| r.setting == *setting) {
+            let (x, y) = (axes.x(r.seconds), axes.y(r.error));
+            // Labels near the right edge stand to the left of their dots.
+            let (x, anchor) = if x > WIDTH - 90.0 { (x - 8.0, "end") } else { (x + 8.0, "start") };
+            let _ =
+                writeln!(s, "<text x=\"{x:.1}\" y=\"{:.1}\" text-anchor=\"{anchor}\">{}</text>", y - 6.0, text(label));
+        }
+    }
+    s + "</svg>\n"
+}
+
+/// Lines and labels of both axes.
+fn grid(s: &mut String, axes: &Axes, error: &str) {
+    let (low, high) = axes.time;
+    for power in low.floor() as i32..=high.ceil() as i32 {
+        for (i, digit) in [1.0, 2.0, 5.0].into_iter().enumerate() {
+            let t = digit * 10f64.powi(power);
+            if t.log10() < low || t.log10() > high {
+                continue;
+            }
+            let x = axes.x(t);
+            let colour = if i == 0 { "#ddd" } else { "#eee" };
+            let _ = write!(s, "<path d=\"M{x:.1},{EDGE}V{}\" stroke=\"{colour}\"/>", HEIGHT - BOTTOM);
+            let y = HEIGHT - BOTTOM + 15.0;
+            let _ = writeln!(s, "<text x=\"{x:.1}\" y=\"{y}\" text-anchor=\"middle\" fill=\"#555\">{t}</text>");
+        }
+    }
+    let step = step(axes.top);
+    for i in 0..=(axes.top / step) as u32 {
+        let e = f64::from(i) * step;
+        let y = axes.y(e);
+        let _ = write!(s, "<path d=\"M{LEFT},{y:.1}H{}\" stroke=\"#eee\"/>", WIDTH - EDGE);
+        // Not 0.30000000000000004.
+        let e = (e * 1e9).round() / 1e9;
+        let (x, y) = (LEFT - 6.0, y + 4.0);
+        let _ = writeln!(s, "<text x=\"{x}\" y=\"{y:.1}\" text-anchor=\"end\" fill=\"#555\">{e}</text>");
+    }
+    let (x, y) = ((LEFT + WIDTH) / 2.0, HEIGHT - 6.0);
+    let _ = writeln!(s, "<text x=\"{x}\" y=\"{y}\" text-anchor=\"middle\">seconds</text>");
+    let middle = (HEIGHT - BOTTOM) / 2.0;
+    let _ = writeln!(
+        s,
+        "<text x=\"14\" y=\"{middle}\" text-anchor=\"middle\" transform=\"rotate(-90 14 {middle})\">{}</text>",
+        text(error)
+    );
+}
+
+/// A round distance of lines, of which five to ten fit.
+fn step(top: f64) -> f64 {
+    let rough = top / 8.0;
+    let power = 10f64.powf(rough.log10().floor());
+    let digit = [1.0, 2.0, 5.0, 10.0].into_iter().find(|d| d * power >= rough).unwrap_or(10.0);
+    digit * power
+}
+
+fn text(s: &str) -> String {
+    s.replace('&', "&amp;").replace('<', "&lt;")
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+    use indexmap::IndexMap;
+
+    fn row(setting: &str, seconds: f64, error: f64, front: bool) -> Row {
+        let scores = IndexMap::new();
+        let (low, high) = (error * 0.8, error * 1.2);
+        let (setting, ess_per_second) = (setting.into(), None);
+        Row {
+            setting,
+            end: true,
+            seconds,
+            error,
+            low,
+            high,
+            cases: 1,
+            runs: 1,
+            failed: 0,
+            scores,
+            ess_per_second,
+            front,
+        }
+    }
+
+    #[test]
+    fn only_finite_numbers_are_written() {
+        let some = [row("a<b", 1.0, 0.3, true), row("c", 10.0, 0.1, true), row("d", 3.0, f64::NAN, false)];
+        for rows in [&some[..], &some[..1], &[], &[row("z", 0.0, 0.0, true)], &[row("h", 1e300, 1e300, true)]] {
+            let s = plot(rows, "error", &[("c".into(), "accurate".into())]);
+            assert!(!s.contains("NaN") && !s.contains("inf"), "{s}");
+            assert!(s.starts_with("<svg") && s.ends_with("</svg>\n"));
+        }
+        let s = plot(&some, "error", &[("c".into(), "accurate".into())]);
+        assert!(s.contains("a&lt;b") && s.contains(">accurate<"));
+    }
+}

@@ -1,0 +1,150 @@
+//! Settings chosen from a front, by name and by the time there is, with what they were chosen from.
+
+use super::rows::Row;
+use super::setting::Setting;
+use serde::{Deserialize, Serialize};
+
+/// How much accuracy is wanted for how much time.
+#[derive(Clone, Copy, Debug, PartialEq, Eq, Serialize, Deserialize)]
+#[serde(rename_all = "lowercase")]
+pub enum Quality {
+    /// The quickest on the front that has at most 1.5 times the error of the most accurate.
+    Fast,
+    /// The quickest that has at most 1.15 times its error.
+    Balanced,
+    /// The most accurate.
+    Accurate,
+}
+
+impl Quality {
+    /// All of them, the quickest first.
+    pub const ALL: [Quality; 3] = [Quality::Fast, Quality::Balanced, Quality::Accurate];
+
+    /// Its name on the command line.
+    pub fn name(self) -> &'static str {
+        match self {
+            Quality::Fast => "fast",
+            Quality::Balanced => "balanced",
+            Quality::Accurate => "accurate",
+        }
+    }
+
+    /// How many times the least error it may have.
+    fn factor(self) -> f64 {
+        match self {
+            Quality::Fast => 1.5,
+            Quality::Balanced => 1.15,
+            Quality::Accurate => 1.0,
+        }
+    }
+}
+
+/// A setting on the front, and what was measured of it.
+#[derive(Clone, Debug, PartialEq, Serialize, Deserialize)]
+pub struct Preset {
+    /// The setting.
+    #[serde(flatten)]
+    pub setting: Setting,
+    /// Seconds it took, the mean over cases.
+    pub seconds: f64,
+    /// Its error, the mean over cases.
+    pub error: f64,
+    /// The 90 % interval of the error over cases.
+    pub interval: [f64; 2],
+    /// How many cases.
+    pub cases: usize,
+}
+
+/// What is known of a program's settings.
+#[derive(Clone, Debug, Default, PartialEq, Serialize, Deserialize)]
+pub struct Presets {
+    /// Where the evidence is: for readers.
+    pub about: String,
+    /// What the error is.
+    pub error: String,
+    /// `data` items that must be given for this to hold.
+    #[serde(default)]
+    pub needs: Vec<String>,
+    /// The front, the quickest first.
+    pub front: Vec<Preset>,
+}
+
+/// What was chosen, and why.
+#[derive(Clone, Debug, PartialEq)]
+pub struct Choice<'a> {
+    /// The setting with its evidence.
+    pub preset: &'a Preset,
+    /// What it was chosen for.
+    pub wanted: String,
+}
+
+impl Presets {
+    /// From a table of settings.
+    pub fn of(settings: &[Setting], rows: &[Row], about: String, error: String, needs: Vec<String>) -> Presets {
+        let mut front: Vec<Preset> = Vec::new();
+        for row in rows.iter().filter(|r| r.front) {
+            let Some(setting) = settings.iter().find(|s| s.name() == row.setting) else { continue };
+            front.push(Preset {
+                setting: setting.clone(),
+                seconds: rounded(row.seconds),
+                error: rounded(row.error),
+                interval: [rounded(row.low), rounded(row.high)],
+                cases: row.cases,
+            });
+        }
+        front.sort_by(|a, b| a.seconds.total_cmp(&b.seconds));
+        Presets { about, error, needs, front }
+    }
+
+    /// The setting of a name; `None` if the front is empty.
+    pub fn of_quality(&self, quality: Quality) -> Option<Choice<'_>> {
+        let least = self.front.iter().map(|p| p.error).min_by(f64::total_cmp)?;
+        let preset = self.front.iter().find(|p| p.error <= least * quality.factor())?;
+        Some(Choice { preset, wanted: format!("--quality {}", quality.name()) })
+    }
+
+    /// The best known setting for so many seconds: that of least error among those whose runs were given as much or less; the quickest
+    /// if none was.
+    pub fn of_time(&self, seconds: f64) -> Option<Choice<'_>> {
+        let within = self.front.iter().filter(|p| p.setting.time.unwrap_or(p.seconds) <= seconds * 1.001);
+        let preset = within.min_by(|a, b| a.error.total_cmp(&b.error)).or(self.front.first())?;
+        Some(Choice { preset, wanted: format!("--time {seconds}s") })
+    }
+}
+
+fn rounded(x: f64) -> f64 {
+    (x * 1e4).round() / 1e4
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    fn presets(all: &[(f64, f64)]) -> Presets {
+        let one = |&(time, error): &(f64, f64)| Preset {
+            setting: Setting { time: Some(time), ..Setting::default() },
+            seconds: time + 0.1,
+            error,
+            interval: [error, error],
+            cases: 10,
+        };
+        Presets { front: all.iter().map(one).collect(), ..Presets::default() }
+    }
+
+    #[test]
+    fn names_are_places_on_the_front() {
+        let p = presets(&[(0.5, 0.30), (1.0, 0.14), (3.0, 0.113), (30.0, 0.10)]);
+        let time = |c: Option<Choice>| c.unwrap().preset.setting.time.unwrap();
+        assert_eq!(Quality::ALL.map(|q| time(p.of_quality(q))), [1.0, 3.0, 30.0]);
+        assert_eq!([0.1, 0.5, 2.0, 5.0, 100.0].map(|t| time(p.of_time(t))), [0.5, 0.5, 1.0, 3.0, 30.0]);
+        assert!(presets(&[]).of_quality(Quality::Fast).is_none());
+    }
+
+    #[test]
+    fn they_are_kept_as_text() {
+        let p = presets(&[(0.5, 0.25)]);
+        let text = serde_json::to_string(&p).unwrap();
+        assert_eq!(serde_json::from_str::<Presets>(&text).unwrap(), p);
+        assert!(text.contains(r#""time":0.5,"seconds":0.6"#), "{text}");
+    }
+}
