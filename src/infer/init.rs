@@ -14,6 +14,7 @@ use crate::syntax::span::Span;
 use crate::trace::{Draws, Limits, Trace, TraceResult};
 use std::fmt;
 use std::sync::Arc;
+use std::time::Duration;
 
 /// How a chain starts: with the best of so many draws from the prior, by log joint density.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
@@ -22,11 +23,13 @@ pub struct Start {
     pub draws: u64,
     /// How many of the best are kept: more than one begin a population that anneals in warm-up.
     pub keep: usize,
+    /// No further draws are tried after this, if one was found.
+    pub within: Option<Duration>,
 }
 
 impl Default for Start {
     fn default() -> Self {
-        Start { draws: 1, keep: 1 }
+        Start { draws: 1, keep: 1, within: None }
     }
 }
 
@@ -85,7 +88,7 @@ pub(crate) fn attempts<T>(most: u64, mut draw: impl FnMut(u64) -> TraceResult<T>
 /// # Errors
 /// If the program fails, or if no draw has positive probability within the bounded retries.
 pub fn starts(code: &Arc<Code>, seed: u64, chain: u32, how: Start, limits: Limits) -> Result<Vec<Trace>, StartError> {
-    let key = StreamKey::new(seed, chain, Purpose::START);
+    let (key, begun) = (StreamKey::new(seed, chain, Purpose::START), Instant::now());
     let mut best: Vec<Trace> = Vec::new();
     let mut found = 0;
     let mut last = None;
@@ -103,7 +106,8 @@ pub fn starts(code: &Arc<Code>, seed: u64, chain: u32, how: Start, limits: Limit
             Err(e) if e.is_recoverable() => last = Some(Err(e)),
             Err(e) => return Err(StartError::Run(e)),
         }
-        if found > 0 && limits.stop.is_asked() || found == 0 && attempt + 1 >= RETRIES {
+        let late = || how.within.is_some_and(|t| begun.elapsed() >= t);
+        if found > 0 && (limits.stop.is_asked() || late()) || found == 0 && attempt + 1 >= RETRIES {
             break;
         }
         // Failures cost attempts too, once there is something to start from.
@@ -129,7 +133,7 @@ fn explain(t: &Trace) -> NoStart {
     NoStart { terms: zero.collect(), drawn: t.choices().into_iter().filter_map(single).take(6).collect() }
 }
 
-/// What the `init` statement of a plan asks for.
+/// What the `init` statement of a plan asks for. Where there is a limit of time, a quarter of it: as much as is left to warm-up.
 pub(crate) fn start_of(code: &Arc<Code>, plan: &[KStmt], options: &RunOptions) -> Result<Start, ChainError> {
     let init = plan.iter().find_map(|s| match &s.kind {
         KStmtKind::Expr(e) => call(e).filter(|(name, _)| *name == "init").map(|(_, args)| (e, args)),
@@ -152,7 +156,7 @@ pub(crate) fn start_of(code: &Arc<Code>, plan: &[KStmt], options: &RunOptions) -
         Some(("best_of", args)) => {
             let draws = argument(args, 0, "n").map_or(Err(wrong()), &mut count)?;
             let keep = argument(args, 1, "keep").map_or(Ok(1), &mut count)?;
-            Ok(Start { draws, keep: keep.min(draws) as usize })
+            Ok(Start { draws, keep: keep.min(draws) as usize, within: options.time.map(|t| t / 4) })
         }
         _ => Err(wrong()),
     }

@@ -199,10 +199,14 @@ impl<'a> Sitting<'a> {
         head.insert("rows".into(), json!(rows));
         self.folder.mark(head)?;
         self.folder.write("table.csv", to_csv(&rows).as_bytes())?;
-        let named: Vec<(String, String)> = Quality::ALL
-            .iter()
-            .filter_map(|q| Some((presets.of_quality(*q)?.preset.setting.name(), q.name().to_owned())))
-            .collect();
+        let mut named: Vec<(String, String)> = Vec::new();
+        for (quality, choice) in Quality::ALL.iter().filter_map(|q| Some((q.name(), presets.of_quality(*q)?))) {
+            let setting = choice.preset.setting.name();
+            match named.iter_mut().find(|n| n.0 == setting) {
+                Some((_, label)) => *label += &format!(", {quality}"),
+                None => named.push((setting, quality.to_owned())),
+            }
+        }
         self.folder.write("plot.svg", plot(&rows, self.error_name(), &named).as_bytes())?;
         let text = serde_json::to_vec_pretty(&presets).unwrap_or_default();
         if let Some(path) = &self.a.presets

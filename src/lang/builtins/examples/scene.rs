@@ -65,6 +65,13 @@ let view = scene.render(scene.box(1), camera = above);",
         seen!("data photo = image(\"ball.png\");", "observe scene.contour(view, size = 32) = photo as picture;"),
     ),
     (
+        "scene.edges",
+        seen!(
+            "data photo = image(\"ball.png\");",
+            "observe scene.contour(view, size = 32) = scene.edges(photo, smooth = 2.5) as picture;"
+        ),
+    ),
+    (
         "scene.chamfer",
         seen!(
             "data photo = image(\"ball.png\");",

@@ -8,6 +8,7 @@ mod bodies;
 mod body_pulls;
 mod compare;
 mod compare_keypoints;
+mod edges;
 mod objects;
 mod observed;
 mod region;
@@ -29,6 +30,7 @@ const ARMATURE: Type = Type::Object("an armature");
 const AFFINE: Type = Type::Object("a placement");
 const CAMERA: Type = Type::Object("a camera");
 const VIEW: Type = Type::Object("a view");
+const IMAGE: Type = Type::Object("an image");
 
 /// A pure function of the module.
 const fn native(
@@ -44,8 +46,9 @@ const fn native(
 
 /// All of them.
 pub(super) fn all() -> impl Iterator<Item = &'static Row> {
-    let tables = [shapes::TABLE, bodies::TABLE, seeing::TABLE, compare::TABLE, compare_keypoints::TABLE, region::TABLE];
-    tables.into_iter().flatten()
+    let comparing = [compare::TABLE, compare_keypoints::TABLE, region::TABLE, edges::TABLE];
+    let tables = [shapes::TABLE, bodies::TABLE, seeing::TABLE].into_iter().chain(comparing);
+    tables.flatten()
 }
 
 /// A shape that cannot be made: numbers outside their domain reject a proposal, anything else ends the run.

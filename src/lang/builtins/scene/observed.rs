@@ -43,9 +43,15 @@ pub struct ImageValue {
     pub(super) ratios: Prepared<Key<ContourRatioOptions>, ContourRatio>,
     pub(super) chamfers: Prepared<Key<ChamferOptions>, Chamfer>,
     pub(super) regions: Prepared<Key<RegionOptions>, Region>,
+    /// The same photograph with contours found otherwise: by what, and how strong they must be.
+    detected: Prepared<(GradientDetector, f32), Value>,
 }
 
 impl ImageValue {
+    /// Points weaker than this are more often texture than outline: the detector's own best threshold against human
+    /// outlines is 0.47, and a few more edges help where the object is dim (docs/objects.md).
+    pub(super) const STRONG: f32 = 0.4;
+
     /// A photograph; its contours are found when they are needed.
     pub fn photo(photo: Photo) -> Self {
         ImageValue { photo: Some(photo), ..ImageValue::default() }
@@ -64,9 +70,19 @@ impl ImageValue {
     /// Its contours.
     pub fn map(&self) -> &ContourMap {
         self.map.get_or_init(|| match &self.photo {
-            Some(photo) => strong(GradientDetector::default().detect(photo)),
+            Some(photo) => strong(GradientDetector::default().detect(photo), Self::STRONG),
             None => ContourMap::default(),
         })
+    }
+
+    /// The same photograph with contours found by a detector, those at least so strong; `None` if there is no photograph.
+    pub(super) fn detected_by(&self, detector: GradientDetector, least: f32) -> Result<Option<Value>, String> {
+        let Some(photo) = &self.photo else { return Ok(None) };
+        let found = self.detected.get((detector, least), |(detector, least)| {
+            let map = strong(detector.detect(photo), *least);
+            Ok(Value::object(ImageValue::contours(map, Some(photo.clone()))))
+        })?;
+        Ok(Some(Value::clone(&found)))
     }
 
     /// Width and height in pixels.
@@ -78,14 +94,10 @@ impl ImageValue {
     }
 }
 
-/// Points weaker than this are more often texture than outline: the detector's own best threshold against human
-/// outlines is 0.47, and a few more edges help where the object is dim (docs/objects.md).
-const STRONG: f32 = 0.4;
-
 /// The points that count as edges.
-fn strong(map: ContourMap) -> ContourMap {
+fn strong(map: ContourMap, least: f32) -> ContourMap {
     let mut kept = ContourMap::new(map.width, map.height);
-    for i in (0..map.len()).filter(|i| map.strength[*i] >= STRONG) {
+    for i in (0..map.len()).filter(|i| map.strength[*i] >= least) {
         kept.x.push(map.x[i]);
         kept.y.push(map.y[i]);
         kept.tx.push(map.tx[i]);

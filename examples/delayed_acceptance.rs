@@ -1,0 +1,119 @@
+//! What delayed acceptance gains: effective draws a second with and without a coarse first stage, for the same posterior.
+//!
+//!     cargo run --release --example delayed_acceptance [-- DRAWS]
+//!
+//! The pose of a known object of revolution, its own clean contours observed by the distance both ways at 256 and 512 pixels; the first
+//! stage compares at 64 pixels. Once with a light mesh (2,000 triangles), once with a full one (100,000), whose first stage draws it with
+//! a coarser mesh as well (`detail` 1). One chain from the truth; random walks of all pose variables at once, with steps so long that fewer and fewer are
+//! accepted. Prints, for each: the share accepted, milliseconds of processor time a step, the smallest effective number of draws of a
+//! pose variable a second; and the ratio of these. DRAWS: how many steps (4000).
+
+mod clock;
+
+use clock::process_seconds;
+use pcadlang::lang::builtins::scene::{ImageValue, ViewValue};
+use pcadlang::lang::value::Value;
+use pcadlang::rng::{Purpose, StreamKey};
+use pcadlang::trace::Draws;
+use pcadlang::vision::ContourMap;
+use pcadlang::{Model, Program, RunOptions};
+use std::error::Error;
+
+const PROGRAM: &str = r#"
+include "std/scene.pcad" as scene;
+data photo: image;
+param fine: int = 256;
+param sides: int = 32;
+param rings: int = 32;
+param detail = 0;
+param step = 0.1;
+param draws: int = 1000;
+for k in ["x", "y", "z"] { assume t[k] ~ normal(0, 1) #pose; }
+assume rx ~ normal(0, 0.4) #pose;
+assume rz ~ normal(0, 0.4) #pose;
+let ys = linspace(0, 2, rings);
+let object = scene.centred(scene.lathe([{ y: ys, r: 0.5 + 0.2 * sin(3 * ys) }], sides = sides));
+let placed = scene.affine(translate = [t.x, t.y, t.z], rotate = [rx, 0, rz]) * object;
+assume view = scene.render(placed);
+assume rough = scene.render(placed, detail = detail);
+observe scene.chamfer(view, sigma = 0.1, symmetric = true, truncate = 20, size = fine) = photo
+  with coarse = scene.chamfer(rough, sigma = 0.1, symmetric = true, truncate = 20, size = 64) as picture;
+force @t[x] = 0.3; force @t[y] = -0.2; force @t[z] = 0.4; force @rx = 0.3; force @rz = -0.2;
+infer {
+  repeat draws { STEP; collect t, rx, rz; }
+}
+"#;
+
+/// The longer side of the picture whose contours are observed.
+const SEEN: u32 = 512;
+
+fn program(step: &str, set: &[(&str, String)], map: ContourMap) -> Result<Model, pcadlang::Error> {
+    let program = Program::parse(&PROGRAM.replace("STEP", step))?;
+    let program = program.observe("photo", Value::object(ImageValue::contours(map, None)));
+    set.iter().fold(program, |p, (name, value)| p.set(name, value)).compile()
+}
+
+/// The contours of the forced state.
+fn contours(set: &[(&str, String)]) -> Result<ContourMap, Box<dyn Error>> {
+    let model = program("mh(one(@**))", set, ContourMap::new(SEEN, SEEN))?;
+    let mut trace = model.run(&RunOptions { steps: Some(0), ..RunOptions::default() }, 1, 1)?.chains.remove(0).last;
+    let draws = Draws { key: StreamKey::new(0, 0, Purpose::PREDICT), step: 0, lane: 0 };
+    let view = trace.global("view", draws).ok_or("no view")?.map_err(|e| model.run_error(*e))?;
+    let c = view.downcast::<ViewValue>().ok_or("no view")?.0.contours(SEEN);
+    let (x, y, tx, ty) = (c.x.clone(), c.y.clone(), c.tx.clone(), c.ty.clone());
+    Ok(ContourMap { strength: vec![1.0; x.len()], x, y, tx, ty, ..ContourMap::new(SEEN, SEEN) })
+}
+
+/// What one chain gives: the share of steps accepted, seconds a step, effective draws a second.
+fn measure(step: &str, set: &[(&str, String)], map: &ContourMap, draws: u64) -> Result<[f64; 3], Box<dyn Error>> {
+    let set: Vec<_> = set.iter().cloned().chain([("draws", draws.to_string())]).collect();
+    let model = program(step, &set, map.clone())?;
+    let begun = process_seconds();
+    let posterior = model.run(&RunOptions { seed: 1, ..RunOptions::default() }, 1, 1)?;
+    let seconds = process_seconds() - begun;
+    let kernel = posterior.chains[0].kernels.first().ok_or("no kernel")?;
+    let smallest = posterior
+        .quantities()
+        .iter()
+        .filter(|q| q.column.is_some())
+        .map(|q| q.summary.ess_bulk)
+        .fold(f64::MAX, f64::min);
+    let accepted = kernel.accepted as f64 / kernel.proposals.max(1) as f64;
+    Ok([accepted, seconds / draws as f64, smallest / seconds])
+}
+
+fn main() -> Result<(), Box<dyn Error>> {
+    let draws: u64 = std::env::args().nth(1).and_then(|a| a.parse().ok()).unwrap_or(4000);
+    println!(
+        "| mesh | coarse / fine | step | accepted, plain | delayed | ms a step, plain | delayed | ESS/s, plain | delayed | ratio |"
+    );
+    println!("| --- | --- | --- | --- | --- | --- | --- | --- | --- | --- |");
+    for (mesh, sides, rings, detail) in [("2,000 triangles", 32, 32, 0.0), ("100,000", 224, 224, 1.0)] {
+        for fine in [256, 512] {
+            let mut set = vec![
+                ("sides", format!("{sides}")),
+                ("rings", format!("{rings}")),
+                ("detail", format!("{detail}")),
+                ("fine", format!("{fine}")),
+            ];
+            let map = contours(&set)?;
+            for step in [0.01, 0.02, 0.04, 0.08] {
+                set.retain(|s| s.0 != "step");
+                set.push(("step", format!("{step}")));
+                let plain = measure("drift($pose, step)", &set, &map, draws)?;
+                let delayed = measure("delayed(drift($pose, step), @picture)", &set, &map, draws)?;
+                println!(
+                    "| {mesh} | 64 / {fine} | {step} | {:.1} % | {:.1} % | {:.3} | {:.3} | {:.1} | {:.1} | {:.2} |",
+                    100.0 * plain[0],
+                    100.0 * delayed[0],
+                    1e3 * plain[1],
+                    1e3 * delayed[1],
+                    plain[2],
+                    delayed[2],
+                    delayed[2] / plain[2]
+                );
+            }
+        }
+    }
+    Ok(())
+}

@@ -1,0 +1,171 @@
+//! `pcadlang tradeoff` on small cases of each kind of truth: tables, resumption, presets and what `run` makes of them.
+
+#[path = "common/folder.rs"]
+mod folder;
+
+use folder::{Folder, disc, png};
+use serde_json::{Value, json};
+
+/// A normal mean with a known posterior: mean 1.6, variance 0.2.
+const MEAN: &str = "param n: int = 100; data y = 0; assume x ~ normal(0, 1); observe normal(x, 0.5) = y;
+    infer { warmup 50 { drift(@x); } repeat n { drift(@x); collect x; } }";
+
+fn table(f: &Folder) -> Vec<Value> {
+    let all: Value = serde_json::from_str(&f.read("tradeoff/tradeoff.json")).unwrap();
+    all["rows"].as_array().unwrap().clone()
+}
+
+fn mean_cases(f: &Folder) {
+    f.write("mean.pcad", MEAN);
+    for (name, y) in [("a", 2.0), ("b", -1.0)] {
+        std::fs::create_dir_all(f.path().join("cases").join(name)).unwrap();
+        f.write(&format!("cases/{name}/y.json"), format!("{y}"));
+        let reference = json!({ "x": { "mean": 0.8 * y, "sd": 0.2f64.sqrt() } });
+        f.write(&format!("cases/{name}/reference.json"), reference.to_string());
+    }
+    f.write("few.json", r#"{"base": {"chains": 2}, "vary": {"n": [2, 100, 20000]}}"#);
+}
+
+fn tradeoff(f: &Folder, more: &[&str]) -> folder::Done {
+    f.run(&[&["tradeoff", "mean.pcad", "--cases", "cases", "--settings", "few.json"], more].concat())
+}
+
+#[test]
+fn more_draws_are_nearer_to_the_reference() {
+    let f = Folder::new("tradeoff_draws");
+    mean_cases(&f);
+    let done = tradeoff(&f, &["--seeds", "4", "--presets", "mean.quality.json"]);
+    assert_eq!(done.code, 0, "{}", done.err);
+    let rows = table(&f);
+    let of = |setting: &str| {
+        let row = rows.iter().find(|r| r["setting"] == setting && r["end"] == true).unwrap();
+        assert_eq!((&row["cases"], &row["runs"]), (&json!(2), &json!(8)));
+        (row["error"].as_f64().unwrap(), row["ess_per_second"].as_f64())
+    };
+    let errors = ["chains=2 n=2", "chains=2", "chains=2 n=20000"].map(|s| of(s).0);
+    assert!(errors[0] > 2.0 * errors[1] && errors[1] > 2.0 * errors[2], "{errors:?}");
+    assert!(errors[2] < 0.1 && of("chains=2").1.unwrap() > 0.0);
+    let csv = f.read("tradeoff/table.csv");
+    assert!(csv.starts_with("setting,end,seconds,error,low,high,cases,runs,failed,ess_per_second,front"), "{csv}");
+    let plot = f.read("tradeoff/plot.svg");
+    assert!(plot.contains("reference posterior") && plot.contains(">accurate<"));
+
+    // What was found is used by name, and what is typed wins.
+    let run = |more: &[&str]| {
+        let done = f.run(&[&["run", "mean.pcad", "--observe", "y=cases/a/y.json", "--out", "r"], more].concat());
+        assert_eq!(done.code, 0, "{}", done.err);
+        let run: Value = serde_json::from_str(&f.read("r/run.json")).unwrap();
+        (run["set"].clone(), run["settings"]["chains"].clone(), done.err)
+    };
+    let (set, chains, said) = run(&["--quality", "accurate"]);
+    assert_eq!((set, chains), (json!({ "n": "20000" }), json!(2)));
+    assert!(
+        said.contains("note: --quality accurate: --set n=20000 --chains 2, of mean.quality.json (error 0."),
+        "{said}"
+    );
+    assert_eq!(run(&["--quality", "accurate", "--set", "n=10"]).0, json!({ "n": "10" }));
+    assert_eq!(run(&["--quality", "own", "--time", "60s"]).0, json!({}));
+    assert_eq!(run(&["--time", "60s", "--chains", "3"]).1, json!(3));
+}
+
+#[test]
+fn what_was_run_is_not_run_again() {
+    let f = Folder::new("tradeoff_again");
+    mean_cases(&f);
+    assert_eq!(tradeoff(&f, &["--only", "a"]).code, 0);
+    let before = f.read("tradeoff/runs.jsonl");
+    // Half a line, as a power cut leaves it.
+    std::fs::write(f.path().join("tradeoff/runs.jsonl"), format!("{before}{{\"setting\": \"chai")).unwrap();
+    f.write("few.json", r#"{"base": {"chains": 2}, "vary": {"n": [2, 100, 20000, 50]}}"#);
+    let again = tradeoff(&f, &["--only", "a"]);
+    assert_eq!(again.code, 0, "{}", again.err);
+    let after = f.read("tradeoff/runs.jsonl");
+    assert!(after.starts_with(&before) && after.lines().count() == 4, "one more setting");
+    // Other cases, another program: what is there is of something else.
+    let other = tradeoff(&f, &[]);
+    assert!(other.code == 1 && other.err.contains("cases is not what it was"), "{}", other.err);
+    assert_eq!(f.read("tradeoff/runs.jsonl"), after);
+    assert_eq!(tradeoff(&f, &["--fresh"]).code, 0);
+}
+
+#[test]
+fn a_short_budget_leaves_out_settings_and_says_so() {
+    let f = Folder::new("tradeoff_budget");
+    mean_cases(&f);
+    let none = tradeoff(&f, &["--budget", "1ms"]);
+    assert!(none.code == 1 && none.err.contains("the budget is used up"), "{}", none.err);
+    // Six runs of ten seconds at most each are thought to take a minute; half of that is enough for two rounds.
+    let half = tradeoff(&f, &["--budget", "45s", "--jobs", "1"]);
+    assert!(half.code == 0 && half.err.contains("round 1 of"), "{}", half.err);
+}
+
+#[test]
+fn surfaces_and_joints_are_scored() {
+    let f = Folder::new("tradeoff_pictures");
+    f.write(
+        "ball.pcad",
+        "include \"std/scene.pcad\" as scene; data photo: image; data points = keypoints();
+         param tries: int = 5; param size: int = 32;
+         assume r ~ uniform(0.3, 1.5);
+         assume view = scene.render(scene.sphere(r));
+         observe scene.contour(view, size = size) = photo as picture;
+         infer { repeat tries { drift(one(@**)); collect r; } }",
+    );
+    // A disc of 14 pixels about the middle of 48 by 32, and the sphere that shows it.
+    std::fs::create_dir_all(f.path().join("cases/ball")).unwrap();
+    f.write("cases/ball/image.png", png(disc(48, 32, 24.0, 16.0, 14.0)));
+    let pixel = |i: usize| {
+        let (x, y) = ((i % 48) as f64 + 0.5 - 24.0, (i / 48) as f64 + 0.5 - 16.0);
+        // 48 pixels are 4.4 units at the distance 8 of the middle.
+        let (x, y, r) = (x * 4.4 / 48.0, y * 4.4 / 48.0, 14.0 * 4.4 / 48.0);
+        let left = r * r - x * x - y * y;
+        (if left > 0.0 { 8.0 - left.sqrt() } else { 0.0 }) as f32
+    };
+    let depth: Vec<f32> = (0..48 * 32).map(pixel).collect();
+    f.write("cases/ball/depth.npy", pcadlang::report::npy::f32_array(&[32, 48], depth.into_iter()));
+    f.write("s.json", r#"{"base": {"chains": 2}, "vary": {"tries": [5, 400]}}"#);
+    let done = f.run(&["tradeoff", "ball.pcad", "--cases", "cases", "--settings", "s.json"]);
+    assert_eq!(done.code, 0, "{}", done.err);
+    let rows = table(&f);
+    let end = rows.iter().find(|r| r["setting"] == "chains=2 tries=400" && r["end"] == true).unwrap();
+    // The ball seen in perspective is a little nearer than in the formula above.
+    assert!(end["error"].as_f64().unwrap() < 0.05 && end["scores"]["iou"].as_f64().unwrap() > 0.85, "{end}");
+    assert_eq!(end["scores"]["n_mse"], json!(2.0), "no normals are known");
+
+    // People: a program without joints finds none.
+    std::fs::create_dir_all(f.path().join("people")).unwrap();
+    f.write("people/one.png", png(disc(48, 32, 24.0, 16.0, 9.0)));
+    let joints = json!({ "l_shoulder": [20, 8, 2], "r_hip": [26, 20, 2], "l_knee": [0, 0, 0] });
+    f.write(
+        "people/annotations.json",
+        json!({ "people": [{ "id": "one", "image": "one.png", "keypoints": joints }] }).to_string(),
+    );
+    let done = f.run(&["tradeoff", "ball.pcad", "--cases", "people", "--settings", "s.json", "--out", "joints"]);
+    assert_eq!(done.code, 0, "{}", done.err);
+    let all: Value = serde_json::from_str(&f.read("joints/tradeoff.json")).unwrap();
+    assert_eq!(all["rows"][0]["scores"], json!({ "error": 1.0, "joints": 2.0, "missed": 2.0 }));
+}
+
+#[test]
+fn mistakes_are_said_before_anything_runs() {
+    let f = Folder::new("tradeoff_mistakes");
+    mean_cases(&f);
+    f.write("bad.json", r#"{"vary": {"m": [1]}}"#).write("worse.json", r#"{"vary": {"chains": [0]}}"#);
+    let fails = |settings: &str, cases: &str| {
+        let done = f.run(&["tradeoff", "mean.pcad", "--cases", cases, "--settings", settings, "--out", "t"]);
+        assert_eq!(done.code, 1);
+        assert!(!f.path().join("t").exists());
+        done.err
+    };
+    assert!(fails("bad.json", "cases").contains("`m`"));
+    assert!(
+        fails("worse.json", "cases")
+            .contains("worse.json: `chains` cannot be 0: expected a whole number from 1 to 1024")
+    );
+    std::fs::create_dir_all(f.path().join("empty/x")).unwrap();
+    f.write("empty/x/image.png", png(disc(48, 32, 24.0, 16.0, 9.0)));
+    let none = fails("few.json", "empty");
+    assert!(none.contains("observes no item of kind `image`") || none.contains("no case has a known answer"), "{none}");
+    let unknown = f.run(&["tradeoff", "mean.pcad", "--cases", "cases"]);
+    assert!(unknown.err.contains("mean.settings.json is not there"), "{}", unknown.err);
+}
