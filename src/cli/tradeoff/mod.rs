@@ -62,7 +62,15 @@ pub fn tradeoff(a: &Tradeoff) -> Result<(), Failure> {
             break;
         }
     }
+    let runs = s.done();
+    let failed: Vec<&str> = runs.iter().filter_map(|r| r.failed.as_deref()).collect();
+    if let (Some(first), true) = (failed.first(), failed.len() == runs.len()) {
+        return Err(plain(format!("all {} runs failed; the first: {first}", runs.len())));
+    }
     s.show();
+    if let Some(first) = failed.first() {
+        s.say(&format!("warning: {} of {} runs failed; the first: {first}", failed.len(), runs.len()));
+    }
     match (interrupt.asked(), out_of_time) {
         (true, _) => Err(Failure::Interrupted),
         (_, true) => Err(Failure::Plain(

@@ -67,7 +67,10 @@ pub fn run(a: &Tradeoff, task: Task, threads: u32, interrupt: &Interrupt) -> Opt
     match measure(a, task, threads, interrupt, record.clone()) {
         _ if interrupt.asked() => None,
         Ok(record) => Some(record),
-        Err(failure) => Some(RunRecord { failed: Some(failure.to_string()), ..record }),
+        Err(failure) => {
+            let said = failure.to_string();
+            Some(RunRecord { failed: Some(said.trim_start_matches("error: ").to_owned()), ..record })
+        }
     }
 }
 
