@@ -45,6 +45,8 @@ pub struct Outcome {
     pub modes: Vec<Mode>,
     /// What has not converged, and the like.
     pub warnings: Vec<String>,
+    /// What is approximate, besides the rounding of doubles and the number of draws.
+    pub approximate: Vec<String>,
     /// The chains.
     pub chains: Vec<ChainResult>,
     /// The summary is of each so-manieth draw: 1, unless there are more than fit the memory.
@@ -303,10 +305,11 @@ fn fill(
     let kernels = table::merged(chains.iter().map(|c| &c.kernels[..]));
     let warnings = table::warnings(&quantities, &kernels, chains.len());
     let modes = modes(&quantities);
+    let approximate = approximate(job, &chains);
     let sites = SiteStats::total(chains.iter().flat_map(|c| &c.sites));
     let summary = json!({
         "quantities": summaries(&quantities, kernel_seconds(&kernels)), "kernels": kernels, "choices": sites,
-        "modes": modes, "warnings": warnings, "every": every,
+        "modes": modes, "warnings": warnings, "approximate": approximate, "every": every,
     });
     write(dir, "summary.json", &serde_json::to_vec_pretty(&summary).unwrap_or_default())?;
     let drawn = best_draw(dir, s.seed, model, &chains, photo.as_ref())?;
@@ -328,7 +331,27 @@ fn fill(
     let mut more = counts(&chains, &quantities);
     more.extend([("sampling_seconds".into(), json!(sampled)), ("seconds".into(), json!(elapsed))]);
     write_record(dir, record, if interrupted { "interrupted" } else { "done" }, Value::Object(more))?;
-    Ok(Outcome { quantities, kernels, sites, modes, warnings, chains, every, seconds: elapsed, interrupted })
+    Ok(Outcome {
+        quantities,
+        kernels,
+        sites,
+        modes,
+        warnings,
+        approximate,
+        chains,
+        every,
+        seconds: elapsed,
+        interrupted,
+    })
+}
+
+/// What is approximate in a run: in its likelihoods, and by its limits.
+fn approximate(job: &Job, chains: &[ChainResult]) -> Vec<String> {
+    let mut all = chains.first().map_or_else(Vec::new, |c| c.last.approximations());
+    if job.sampling.time.is_some() {
+        all.push("a limit of time: how far the chains came depends on the machine".into());
+    }
+    all
 }
 
 /// What `run.json` says of the chains at the end.

@@ -41,6 +41,7 @@ fn show(a: &Run, job: &Job, dir: &RunDir, o: &Outcome) {
                 "out": dir.path(), "seed": seed, "quantities": all, "kernels": o.kernels, "choices": o.sites,
                 "modes": o.modes,
                 "warnings": o.warnings,
+                "approximate": o.approximate,
             })
         );
         return;
@@ -58,6 +59,9 @@ fn show(a: &Run, job: &Job, dir: &RunDir, o: &Outcome) {
     }
     for w in &o.warnings {
         println!("warning: {w}");
+    }
+    for a in &o.approximate {
+        println!("approximate: {a}");
     }
     if o.chains.first().is_some_and(|c| c.last.is_pseudo()) {
         println!(

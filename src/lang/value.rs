@@ -147,6 +147,10 @@ pub trait Likelihood: fmt::Debug + Send + Sync {
     fn is_proper(&self) -> bool {
         true
     }
+    /// What is approximate in it by its settings, for readers: single precision, coarser meshes, distances cut off. The run says so.
+    fn approximations(&self) -> Vec<String> {
+        Vec::new()
+    }
 }
 
 impl Value {

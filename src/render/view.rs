@@ -46,6 +46,11 @@ impl View {
         &self.camera
     }
 
+    /// By how many pixels contours and depth may be off.
+    pub fn detail(&self) -> f64 {
+        self.detail
+    }
+
     /// What contours and depth show in the picture whose longer side has `size` pixels (0 counts as 1).
     pub fn scene(&self, size: u32) -> Scene {
         let camera = self.camera.scaled_to(size);

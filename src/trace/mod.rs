@@ -453,6 +453,20 @@ impl Trace {
         self.likelihoods().any(|(l, _)| !l.is_proper())
     }
 
+    /// What is approximate in the likelihoods by their settings, each once.
+    pub fn approximations(&self) -> Vec<String> {
+        let mut all: Vec<String> = Vec::new();
+        for (l, _) in self.likelihoods() {
+            let said = l.approximations().into_iter().map(|what| format!("{}: {what}", l.name()));
+            for what in said {
+                if !all.contains(&what) {
+                    all.push(what);
+                }
+            }
+        }
+        all
+    }
+
     /// The observations and factors.
     fn scored_nodes(&self) -> impl Iterator<Item = u32> {
         let nodes = self.graph.nodes.iter().zip(0..).filter(|(n, _)| n.state == State::Clean).map(|(_, i)| i);

@@ -15,7 +15,7 @@ use crate::num::LN_SQRT_2PI;
 use crate::num::simd::vectorised;
 use crate::platform::threads::side_by_side;
 
-pub use self::reverse::Scratch;
+pub use self::reverse::{MOST_OBSERVED, Scratch};
 
 /// How distances become a score.
 #[derive(Debug, Clone, Copy, PartialEq, Eq, Default)]
@@ -35,7 +35,7 @@ pub struct ChamferOptions {
     /// Mean of the distances or a sum of scores. Default mean.
     pub mode: Mode,
     /// Also measure from the observed contours to the rendered ones: the distance is the mean of both directions' means
-    /// (`Sum`: both directions' scores are added). Of more than 1,024 observed points an even choice is measured. It
+    /// (`Sum`: both directions' scores are added). Of more than 512 observed points an even choice is measured. It
     /// assumes that the picture holds nothing but the object: in clutter it prefers what lies near all of it. Default off.
     pub symmetric: bool,
     /// Distances count as this at most, in percent of the diagonal, above 0. Default none.

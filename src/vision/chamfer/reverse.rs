@@ -9,7 +9,7 @@ use super::super::field::{Edge, Edges, channel, turn_between};
 const BUCKETS: f32 = 12.0;
 
 /// Observed points that are measured; of more, every so many-th in the order of the buckets stands for its neighbours.
-const POINTS: usize = 512;
+pub const MOST_OBSERVED: usize = 512;
 
 /// Memory that evaluations reuse.
 #[derive(Debug, Clone, Default)]
@@ -79,9 +79,9 @@ impl Reverse {
             })
             .collect();
         r.sort(&points, &mut start, &mut sorted);
-        if sorted.len() > POINTS {
-            r.stands_for = sorted.len() as f32 / POINTS as f32;
-            let few: Vec<Piece> = (0..POINTS).map(|i| sorted[i * sorted.len() / POINTS]).collect();
+        if sorted.len() > MOST_OBSERVED {
+            r.stands_for = sorted.len() as f32 / MOST_OBSERVED as f32;
+            let few: Vec<Piece> = (0..MOST_OBSERVED).map(|i| sorted[i * sorted.len() / MOST_OBSERVED]).collect();
             r.sort(&few, &mut start, &mut sorted);
         }
         r.start = start;

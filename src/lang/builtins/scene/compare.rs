@@ -107,6 +107,15 @@ pub(super) const TABLE: &[Row] = &[
     .pull(|_, _, by| Some(by_view(by.clone(), 5))),
 ];
 
+/// How a picture is drawn, as far as it is not exact.
+pub(super) fn drawn(view: &View, size: u32) -> String {
+    let coarse = match view.detail() {
+        0.0 => String::new(),
+        d => format!(", contours of meshes that are coarser by up to {d} pixels"),
+    };
+    format!("drawn at {size} pixels in single precision{coarse}")
+}
+
 pub(super) fn likelihood(l: impl Likelihood + 'static) -> Result<Value, Fault> {
     Ok(Value::Likelihood(Arc::new(l)))
 }
@@ -236,6 +245,11 @@ impl Likelihood for ContourOf {
     fn is_proper(&self) -> bool {
         false
     }
+
+    fn approximations(&self) -> Vec<String> {
+        let cut = format!("no edge is looked for beyond {} % of the diagonal", self.options.truncate);
+        vec![drawn(&self.view, self.size), cut]
+    }
 }
 
 #[derive(Debug)]
@@ -280,6 +294,15 @@ impl Likelihood for ChamferOf {
     fn is_proper(&self) -> bool {
         false
     }
+
+    fn approximations(&self) -> Vec<String> {
+        let cut = self.options.truncate.map(|t| format!("distances above {t} % of the diagonal count as that"));
+        let most = format!("of more than {} observed points an even choice is measured", chamfer::MOST_OBSERVED);
+        [Some(drawn(&self.view, self.size)), cut, self.options.symmetric.then_some(most)]
+            .into_iter()
+            .flatten()
+            .collect()
+    }
 }
 
 #[derive(Debug)]
@@ -307,6 +330,10 @@ impl MaskOf {
 impl Likelihood for MaskOf {
     fn name(&self) -> &'static str {
         "scene.mask"
+    }
+
+    fn approximations(&self) -> Vec<String> {
+        vec![drawn(&self.view, self.size)]
     }
 
     fn log_density(&self, observed: &Value) -> Result<f64, String> {
@@ -359,6 +386,10 @@ impl DepthOf {
 impl Likelihood for DepthOf {
     fn name(&self) -> &'static str {
         "scene.depth"
+    }
+
+    fn approximations(&self) -> Vec<String> {
+        vec![drawn(&self.view, self.size)]
     }
 
     fn log_density(&self, observed: &Value) -> Result<f64, String> {

@@ -1,7 +1,7 @@
 //! The likelihood of a photograph's colours given a view: `scene.region`. The arithmetic is in [`crate::vision::region`]; here the
 //! drawn frame becomes a group for each pixel.
 
-use super::compare::{SECTION, SEEN, SIZE, by_silhouette, by_view, image, likelihood, size, view};
+use super::compare::{SECTION, SEEN, SIZE, by_silhouette, by_view, drawn, image, likelihood, size, view};
 use super::native;
 use super::observed::ImageValue;
 use crate::lang::adjoint::Adjoint;
@@ -116,6 +116,10 @@ impl RegionOf {
 impl Likelihood for RegionOf {
     fn name(&self) -> &'static str {
         "scene.region"
+    }
+
+    fn approximations(&self) -> Vec<String> {
+        vec![drawn(&self.view, self.size)]
     }
 
     fn log_density(&self, observed: &Value) -> Result<f64, String> {
