@@ -108,8 +108,9 @@ impl Covariance {
                 sd * sd * (1.0 + r * (1.0 + r / 3.0)) * libm::exp(-r)
             }
             Periodic { period, length, sd } => {
-                // The remainder is exact, so that far points keep their phase.
-                let s = libm::sin(core::f64::consts::PI * (libm::fmod(d, *period) / period)) / length;
+                // The remainder is exact, so that far points keep their phase; the one nearest to 0, so that points whole periods apart
+                // are as exact as near ones.
+                let s = libm::sin(core::f64::consts::PI * (libm::remainder(d, *period) / period)) / length;
                 sd * sd * libm::exp(-2.0 * s * s)
             }
             White { .. } => 0.0,
@@ -156,7 +157,7 @@ impl Covariance {
                 add(1, 2.0 * k / sd);
             }
             Periodic { period, length, sd } => {
-                let angle = core::f64::consts::PI * (libm::fmod(far, *period) / period);
+                let angle = core::f64::consts::PI * (libm::remainder(far, *period) / period);
                 let s = libm::sin(angle) / length;
                 // The distance in periods, whole ones too, moves with the period.
                 add(0, 4.0 * k * s * libm::cos(angle) / length * core::f64::consts::PI * far / (period * period));

@@ -270,14 +270,20 @@ impl Registered {
     }
 }
 
-/// The Metropolis-Hastings test; NaN is a rejection.
+/// The Metropolis-Hastings test. A ratio that is NaN, which would be a rejection, is a mistake of the kernel.
 pub(crate) fn accepts(log_ratio: f64, rng: &mut Stream) -> bool {
+    debug_assert!(!log_ratio.is_nan());
     let u = rng.open_uniform();
     log_ratio >= 0.0 || libm::log(u) < log_ratio
 }
 
-/// Keeps or undoes the pending proposal.
+/// Keeps or undoes the pending proposal. NaN is a rejection.
 pub fn decide(trace: &mut Trace, log_ratio: f64, rng: &mut Stream) -> Outcome {
+    settle(trace, if log_ratio.is_nan() { f64::NEG_INFINITY } else { log_ratio }, rng)
+}
+
+/// The same for kernels that never ask about NaN.
+pub(crate) fn settle(trace: &mut Trace, log_ratio: f64, rng: &mut Stream) -> Outcome {
     let accepted = accepts(log_ratio, rng);
     if accepted {
         trace.commit()

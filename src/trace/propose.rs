@@ -80,15 +80,20 @@ pub struct Weight {
 }
 
 impl Weight {
-    /// The log weight with the likelihood raised to a power.
+    /// The log weight with the likelihood raised to a power. What is impossible is so at every power.
     pub fn tempered(&self, power: f64) -> f64 {
-        if power == 1.0 { self.log_weight } else { self.log_weight - (1.0 - power) * self.log_likelihood }
+        if power == 1.0 || self.log_weight.is_infinite() {
+            self.log_weight
+        } else {
+            self.log_weight - (1.0 - power) * self.log_likelihood
+        }
     }
 
     /// The same of an update that changes these sums by these terms, and no structure.
     pub(crate) fn beside(prior: &ExactSum, likelihood: &ExactSum, power: f64) -> f64 {
         let log_weight = ExactSum::of_both(prior, likelihood);
-        if power == 1.0 { log_weight } else { log_weight - (1.0 - power) * likelihood.above_nothing() }
+        let flat = power == 1.0 || log_weight.is_infinite();
+        if flat { log_weight } else { log_weight - (1.0 - power) * likelihood.above_nothing() }
     }
 }
 

@@ -1,6 +1,7 @@
 //! Running programs given as text, and judging their draws.
 #![allow(dead_code)]
 
+pub mod families;
 pub mod kernels;
 
 use pcadlang::Model;

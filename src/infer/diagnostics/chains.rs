@@ -1,18 +1,26 @@
 //! A rectangle of draws, chain after chain, and the moments the diagnostics need.
 
-/// Draws of several chains of one length.
+/// Draws of several chains of one length, in a unit that suits them: squares and fourth powers of draws of any size are then numbers.
 #[derive(Clone, Debug, PartialEq)]
 pub(super) struct Chains {
     values: Vec<f64>,
     draws: usize,
+    unit: f64,
 }
 
 impl Chains {
     /// Copies the draws; `None` if there are fewer than four in a chain, or one is not finite.
     pub fn new<C: AsRef<[f64]>>(chains: &[C]) -> Option<Chains> {
         let draws = chains.iter().map(|c| c.as_ref().len()).min()?;
-        let values: Vec<f64> = chains.iter().flat_map(|c| c.as_ref().iter().take(draws)).copied().collect();
-        (draws >= 4 && values.iter().all(|x| x.is_finite())).then_some(Chains { values, draws })
+        let mut values: Vec<f64> = chains.iter().flat_map(|c| c.as_ref().iter().take(draws)).copied().collect();
+        let unit = unit(&values);
+        values.iter_mut().for_each(|x| *x /= unit);
+        (draws >= 4 && values.iter().all(|x| x.is_finite())).then_some(Chains { values, draws, unit })
+    }
+
+    /// What the draws are given in: a power of 2.
+    pub fn unit(&self) -> f64 {
+        self.unit
     }
 
     /// The number of chains.
@@ -41,7 +49,7 @@ impl Chains {
         let mut values = Vec::with_capacity(2 * half * self.count());
         values.extend(self.iter().flat_map(|c| &c[..half]));
         values.extend(self.iter().flat_map(|c| &c[c.len() - half..]));
-        Chains { values, draws: half }
+        Chains { values, draws: half, ..*self }
     }
 
     /// The same chains with every draw replaced.
@@ -52,8 +60,14 @@ impl Chains {
     /// The same shape with other values.
     pub fn with_values(&self, values: Vec<f64>) -> Chains {
         debug_assert_eq!(values.len(), self.values.len());
-        Chains { values, draws: self.draws }
+        Chains { values, ..*self }
     }
+}
+
+/// The power of 2 at or below the largest of these numbers, so that dividing by it is exact; 1 if there is none.
+pub(super) fn unit(x: &[f64]) -> f64 {
+    let largest = x.iter().fold(0.0, |m: f64, x| m.max(x.abs()));
+    if largest > 0.0 && largest.is_finite() { libm::ldexp(1.0, libm::ilogb(largest)) } else { 1.0 }
 }
 
 /// The mean; NaN of nothing.

@@ -4,7 +4,7 @@
 //! on rank-normalised draws for the bulk and on indicators for quantiles.
 
 use super::autocovariance::autocovariance;
-use super::chains::{Chains, mean, variance};
+use super::chains::{Chains, mean, unit, variance};
 use super::normal_scores::normal_scores;
 use super::quantile::quantile;
 
@@ -50,7 +50,7 @@ pub(super) fn ess(chains: &Chains) -> f64 {
     let (count, n) = (chains.count() as f64, chains.draws());
     let total = count * n as f64;
     let (low, high) = chains.values().iter().fold((f64::MAX, f64::MIN), |(l, h), &x| (l.min(x), h.max(x)));
-    if high - low < RESOLUTION {
+    if high - low < RESOLUTION * unit(chains.values()) {
         return total;
     }
     let covariances: Vec<Vec<f64>> = chains.iter().map(autocovariance).collect();
@@ -91,5 +91,5 @@ pub(super) fn ess(chains: &Chains) -> f64 {
     total / tau
 }
 
-/// The decimal resolution of a double: a smaller spread counts as none.
+/// The decimal resolution of a double, in the unit of the draws: a smaller spread counts as none.
 const RESOLUTION: f64 = 1e-15;

@@ -15,7 +15,7 @@ pub fn mcse_sd<C: AsRef<[f64]>>(chains: &[C]) -> f64 {
 }
 
 pub(super) fn of_mean(chains: &Chains) -> f64 {
-    (variance(chains.values()) / ess(&chains.split())).sqrt()
+    chains.unit() * (variance(chains.values()) / ess(&chains.split())).sqrt()
 }
 
 pub(super) fn of_sd(chains: &Chains) -> f64 {
@@ -24,5 +24,5 @@ pub(super) fn of_sd(chains: &Chains) -> f64 {
     let expected = mean(squares.values());
     let fourth = mean(&squares.values().iter().map(|s| s * s).collect::<Vec<_>>());
     let of_variance = (fourth - expected * expected) / ess(&squares.split());
-    (of_variance / expected / 4.0).sqrt()
+    chains.unit() * (of_variance / expected / 4.0).sqrt()
 }

@@ -17,8 +17,16 @@ pub fn quantile_sorted(sorted: &[f64], p: f64) -> f64 {
     let at = last as f64 * p.clamp(0.0, 1.0);
     let below = (at as usize).min(last);
     let (lo, hi) = (sorted[below], sorted[(below + 1).min(last)]);
+    let share = at - below as f64;
     // Between equal values there is nothing to interpolate, and rounding must not lead outside.
-    if lo == hi { lo } else { lo + (at - below as f64) * (hi - lo) }
+    if lo == hi || share == 0.0 {
+        lo
+    } else if (hi - lo).is_finite() {
+        lo + share * (hi - lo)
+    } else {
+        // Too far apart for a difference, or infinitely far.
+        (1.0 - share) * lo + share * hi
+    }
 }
 
 #[cfg(test)]

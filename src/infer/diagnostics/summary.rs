@@ -1,6 +1,6 @@
 //! Everything about one quantity in one struct.
 
-use super::chains::{Chains, variance};
+use super::chains::{Chains, mean, unit, variance};
 use super::quantile::quantile_sorted;
 use super::{ess, mcse, rhat};
 use serde::{Deserialize, Serialize};
@@ -46,8 +46,9 @@ pub fn summary<C: AsRef<[f64]>>(chains: &[C]) -> Summary {
     let mut all: Vec<f64> = chains.iter().flat_map(|c| c.as_ref()).copied().collect();
     let nan = all.iter().any(|x| x.is_nan());
     let defined = |x: f64| if nan { f64::NAN } else { x };
-    let m = super::chains::mean(&all);
-    let sd = variance(&all).sqrt();
+    let unit = unit(&all);
+    let scaled: Vec<f64> = all.iter().map(|x| x / unit).collect();
+    let (m, sd) = (unit * mean(&scaled), unit * variance(&scaled).sqrt());
     all.sort_by(f64::total_cmp);
     let valid = Chains::new(chains);
     let of = |f: fn(&Chains) -> f64| valid.as_ref().map_or(f64::NAN, f);

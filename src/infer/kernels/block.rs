@@ -1,6 +1,6 @@
 //! Blocked Metropolis-Hastings from the prior: q_block of Kulkarni et al. 2014, section 3.
 
-use crate::infer::kernel::{At, Kernel, Outcome, Registered, Scope, decide, recoverable};
+use crate::infer::kernel::{At, Kernel, Outcome, Registered, Scope, recoverable, settle};
 use crate::trace::{Trace, TraceResult};
 
 /// `block(sel)`: draws all selected choices anew from their priors, together. Choices that appear or vanish in consequence
@@ -31,6 +31,6 @@ impl Kernel for Block {
         let proposed = trace.regenerate(&targets, at.draws(0));
         let Some(weight) = recoverable(proposed)? else { return Ok(Outcome::failed()) };
         let ratio = at.tempered(&weight) + ways - self.scope.ways_back(trace);
-        Ok(decide(trace, ratio, &mut rng))
+        Ok(settle(trace, ratio, &mut rng))
     }
 }

@@ -6,7 +6,7 @@
 //! posterior invariant in this way, whatever the surrogate says, as long as it is possible wherever the observation is. The observation
 //! itself is evaluated for what the first stage lets through, and for nothing else.
 
-use crate::infer::kernel::{At, Kernel, Outcome, decide, recoverable};
+use crate::infer::kernel::{At, Kernel, Outcome, recoverable, settle};
 use crate::infer::selection::fail;
 use crate::infer::state::StateError;
 use crate::lang::error::RunError;
@@ -96,7 +96,7 @@ impl Kernel for Delayed {
                     if at.power == 1.0 { w.log_joint } else { w.log_joint - (1.0 - at.power) * w.log_likelihood };
                 // Choices that only the observation asks for stay as they are.
                 let same = trace.lacks(twin).is_none() && trace.choice_count() - twin.choice_count() == more;
-                let decided = decide(trace, if same { fine - coarse } else { f64::NEG_INFINITY }, &mut at.stream());
+                let decided = settle(trace, if same { fine - coarse } else { f64::NEG_INFINITY }, &mut at.stream());
                 Outcome { accepted: decided.accepted.min(inner.accepted), ..inner }
             }
         };

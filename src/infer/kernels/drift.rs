@@ -7,7 +7,7 @@
 
 use super::shape::{MOST, Shape};
 use crate::dist::{Datum, Support};
-use crate::infer::kernel::{At, Kernel, Outcome, Pick, Registered, Scope, decide, recoverable};
+use crate::infer::kernel::{At, Kernel, Outcome, Pick, Registered, Scope, recoverable, settle};
 use crate::infer::state::{StateError, holds, pack, unpack};
 use crate::lang::key::mix;
 use crate::rng::Stream;
@@ -18,6 +18,9 @@ use serde::{Deserialize, Serialize};
 /// The acceptance rates aimed at in one dimension and in many (Roberts & Rosenthal 2001).
 const ONE_D: f64 = 0.44;
 const MANY_D: f64 = 0.234;
+
+/// The logarithm of the largest scale that is learnt, and less that of the smallest.
+const FARTHEST: f64 = 350.0;
 
 /// `drift(sel, scale)`: a random walk in the unconstrained space.
 #[derive(Clone, Debug)]
@@ -146,7 +149,7 @@ impl Drift {
             // Not below a twentieth: an annealed warm-up moves the target all the time.
             let gain = libm::pow(s.steps, -0.6).max(0.05);
             s.log += gain * (f64::from(u8::from(accepted)) - aim) * 2.0;
-            s.log = s.log.clamp(-20.0, 6.0);
+            s.log = s.log.clamp(-FARTHEST, FARTHEST);
         }
     }
 }
@@ -239,7 +242,7 @@ impl Kernel for Drift {
                 for (t, m) in moves.iter().filter(|(t, _)| !trace.was_removed(*t)) {
                     ratio += m.back(trace, *t).unwrap_or(f64::NEG_INFINITY) - m.old_term;
                 }
-                decide(trace, ratio, &mut rng)
+                settle(trace, ratio, &mut rng)
             }
         };
         outcome.site = (!joint).then_some(targets[0]);

@@ -15,7 +15,7 @@
 //! Densities are kept relative to the prior's, which cancels what [`Weight::log_weight`](crate::trace::Weight) has of it.
 
 use crate::dist::{Datum, Support};
-use crate::infer::kernel::{At, Kernel, Outcome, Registered, Scope, decide, recoverable};
+use crate::infer::kernel::{At, Kernel, Outcome, Registered, Scope, recoverable, settle};
 use crate::infer::neighbours::{Latent, Neighbours};
 use crate::num::log_sum_exp;
 use crate::rng::Stream;
@@ -267,7 +267,7 @@ impl Kernel for Knn {
         if w.log_joint == f64::NEG_INFINITY {
             ratio = f64::NEG_INFINITY;
         }
-        Ok(decide(trace, ratio, &mut rng))
+        Ok(settle(trace, ratio, &mut rng))
     }
 }
 

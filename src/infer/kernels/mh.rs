@@ -1,6 +1,6 @@
 //! Single-site Metropolis-Hastings from the prior: q_single of Kulkarni et al. 2014, section 3.
 
-use crate::infer::kernel::{At, Kernel, Outcome, Registered, Scope, decide, recoverable};
+use crate::infer::kernel::{At, Kernel, Outcome, Registered, Scope, recoverable, settle};
 use crate::trace::{Change, Trace, TraceResult};
 
 /// `mh(sel)`: draws one choice anew from its prior, given the rest.
@@ -31,6 +31,6 @@ impl Kernel for Mh {
         let proposed = trace.propose(&[(target, Change::Resample)], at.draws(0));
         let Some(weight) = recoverable(proposed)? else { return Ok(Outcome::failed().at(target)) };
         let ratio = at.tempered(&weight) + libm::log(n as f64) - self.scope.ways_back(trace);
-        Ok(decide(trace, ratio, &mut rng).at(target))
+        Ok(settle(trace, ratio, &mut rng).at(target))
     }
 }

@@ -44,7 +44,7 @@ impl Slice {
     fn learn(&mut self, key: (u64, usize), moved: f64) {
         let (width, count) = self.learnt.entry(key).or_insert((1.0, 0.0));
         *count += 1.0;
-        *width += ((3.0 * moved).clamp(1e-6, 1e6) - *width) / count.min(50.0);
+        *width += ((3.0 * moved).clamp(1e-150, 1e150) - *width) / count.min(50.0);
     }
 }
 

@@ -96,6 +96,8 @@ impl Kernel for Temper {
             let (low, high) = self.replicas.split_at_mut(pair);
             let (colder, hotter) = (low.last_mut().unwrap_or(&mut *trace), &mut high[0]);
             let rise = hotter.log_likelihood() - colder.log_likelihood();
+            // Of two impossible states neither is better.
+            let rise = if rise.is_nan() { f64::NEG_INFINITY } else { rise };
             let ratio = at.power * (powers[pair] - powers[pair + 1]) * rise;
             let swapped = accepts(ratio, &mut rng);
             if swapped {
@@ -103,7 +105,7 @@ impl Kernel for Temper {
             }
             outcome.add(Outcome::one(swapped));
             if at.adapting {
-                self.adapt(pair, if ratio.is_nan() { 0.0 } else { libm::exp(ratio.min(0.0)) });
+                self.adapt(pair, libm::exp(ratio.min(0.0)));
             }
         }
         self.rounds = self.rounds.wrapping_add(1);

@@ -1,0 +1,56 @@
+//! Log densities and their gradients against the table, and where there is no density to speak of.
+
+use super::points::Points;
+use super::table::{agree, rows};
+use crate::common::families::{datum, made};
+use pcadlang::dist::Datum;
+
+#[test]
+fn log_densities_agree_with_the_table() {
+    let mut points = Points::of("log densities");
+    for r in rows("density") {
+        // Near its zeros the error is absolute.
+        let relative = if r.region == "body" { 1e-12 } else { 1e-9 };
+        let got = made(r.name, &r.parameters).log_density(&datum(r.name, &r.point));
+        let [expected] = r.values[..] else { panic!("{}", r.line) };
+        points.check(agree(got, expected, relative, 1e-12), || format!("{}: got {got:e}", r.line));
+    }
+    points.finish();
+}
+
+#[test]
+fn gradients_agree_with_the_table() {
+    let mut points = Points::of("gradients");
+    for r in rows("gradient") {
+        let got = made(r.name, &r.parameters).gradient(&datum(r.name, &r.point));
+        let got: Vec<f64> = got.iter().flat_map(|g| g.x.iter().chain(&g.params)).copied().collect();
+        let right = got.len() >= r.values.len() && r.values.iter().zip(&got).all(|(v, g)| agree(*g, *v, 1e-9, 0.0));
+        points.check(right, || format!("{}: got {got:?}", r.line));
+    }
+    points.finish();
+}
+
+#[test]
+fn nothing_is_likely_that_is_not_finite() {
+    let mut points = Points::of("points that are not finite");
+    let mut last = String::new();
+    for r in rows("density") {
+        let this = format!("{} {:?}", r.name, r.parameters);
+        if std::mem::replace(&mut last, this.clone()) == this {
+            continue;
+        }
+        let d = made(r.name, &r.parameters);
+        for odd in [f64::INFINITY, f64::NEG_INFINITY, f64::NAN] {
+            for i in 0..r.point.len() {
+                let mut x = r.point.clone();
+                x[i] = odd;
+                let x = datum(r.name, &x);
+                let right = d.log_density(&x) == f64::NEG_INFINITY && d.gradient(&x).is_none();
+                points.check(right, || format!("{this} at {x:?}: {}", d.log_density(&x)));
+            }
+        }
+        let other = Datum::Bool(true);
+        points.check(d.log_density(&other) == f64::NEG_INFINITY, || format!("{this} at {other:?}"));
+    }
+    points.finish();
+}

@@ -1,0 +1,48 @@
+//! Counts checked points, gathers those that are wrong, and holds the counts against the table of `docs/extremes.md`.
+
+const DOCUMENT: &str = include_str!("../../docs/extremes.md");
+
+/// The points of one subject.
+pub struct Points {
+    subject: &'static str,
+    checked: usize,
+    wrong: Vec<String>,
+}
+
+impl Points {
+    pub fn of(subject: &'static str) -> Points {
+        Points { subject, checked: 0, wrong: Vec::new() }
+    }
+
+    /// One more point; what is said of it if it is wrong.
+    pub fn check(&mut self, right: bool, what: impl FnOnce() -> String) {
+        self.checked += 1;
+        if !right {
+            self.wrong.push(what());
+        }
+    }
+
+    /// All points are right, and as many as the document says.
+    pub fn finish(self) {
+        let Points { subject, checked, wrong } = self;
+        assert!(wrong.is_empty(), "{subject}: {} of {checked} are wrong:\n{}", wrong.len(), wrong.join("\n"));
+        let documented = documented().find(|(name, _)| *name == subject).map(|(_, n)| n);
+        assert_eq!(documented, Some(checked), "docs/extremes.md should say {checked} points for \"{subject}\"");
+    }
+}
+
+/// The rows of the document's table: a subject and, last, its number of points.
+fn documented() -> impl Iterator<Item = (&'static str, usize)> {
+    DOCUMENT.lines().filter_map(|line| {
+        let mut cells = line.strip_prefix('|')?.strip_suffix('|')?.split('|').map(str::trim);
+        Some((cells.next()?, cells.next_back()?.parse().ok()?))
+    })
+}
+
+#[test]
+fn there_are_at_least_2000_points() {
+    let total: usize = documented().map(|(_, n)| n).sum();
+    assert!(total >= 2000, "{total}");
+    let said = DOCUMENT.lines().find_map(|l| l.strip_prefix("Together ")?.split(' ').next()?.parse().ok());
+    assert_eq!(said, Some(total), "docs/extremes.md should say: Together {total} points");
+}
