@@ -22,15 +22,17 @@ impl Cauchy {
     }
 }
 
-/// The derivatives at z scales from the location; the same for one half of the distribution.
-pub(super) fn cauchy_slope(z: f64, scale: f64) -> Slope {
+/// The derivatives at x; the same for one half of the distribution.
+pub(super) fn cauchy_slope(x: f64, location: f64, scale: f64) -> Slope {
+    let z = standard(x, location, scale);
     // 2 z / (1 + z^2) and z times it, with no overflow.
     let (once, twice) = if z.abs() < 1.0 {
         (2.0 * z / (1.0 + z * z), 2.0 * z * z / (1.0 + z * z))
     } else {
         (2.0 / (z + 1.0 / z), 2.0 / (1.0 + 1.0 / z / z))
     };
-    Slope::new(-once / scale, [once / scale, (twice - 1.0) / scale])
+    let by_x = if z.is_finite() { once / scale } else { 2.0 / (x - location) };
+    Slope::new(-by_x, [by_x, (twice - 1.0) / scale])
 }
 
 impl Scalar for Cauchy {
@@ -50,14 +52,14 @@ impl Scalar for Cauchy {
     #[inline]
     fn log_density_num(&self, x: f64) -> f64 {
         if x.is_finite() {
-            self.log_norm - log1p_square(standard(x, self.location, self.scale))
+            self.log_norm - log1p_square(x, self.location, self.scale)
         } else {
             f64::NEG_INFINITY
         }
     }
 
     fn slope(&self, x: f64) -> Slope {
-        cauchy_slope(standard(x, self.location, self.scale), self.scale)
+        cauchy_slope(x, self.location, self.scale)
     }
 
     fn number_mean(&self) -> Option<f64> {

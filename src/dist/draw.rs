@@ -54,8 +54,16 @@ pub(super) fn x_log1p_y(x: f64, y: f64) -> f64 {
     if x == 0.0 { 0.0 } else { x * libm::log1p(y) }
 }
 
-/// ln(1 + z^2), also where the square would overflow.
+/// ln(1 + z^2) for z = (x - location) / scale, also where z or its square would overflow.
 #[inline]
-pub(super) fn log1p_square(z: f64) -> f64 {
-    if z.abs() < 1e150 { libm::log1p(z * z) } else { 2.0 * libm::log(z.abs()) }
+pub(super) fn log1p_square(x: f64, location: f64, scale: f64) -> f64 {
+    let z = standard(x, location, scale);
+    if z.abs() < 1e150 { libm::log1p(z * z) } else { far_square(x, location, scale) }
+}
+
+/// The same of a z so large that it is ln(z^2).
+#[cold]
+pub(super) fn far_square(x: f64, location: f64, scale: f64) -> f64 {
+    // Halves, whose difference is a number.
+    2.0 * (libm::log((0.5 * x - 0.5 * location).abs()) - libm::log(scale) + core::f64::consts::LN_2)
 }

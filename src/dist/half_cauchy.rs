@@ -1,7 +1,7 @@
 //! The upper half of a Cauchy distribution.
 
 use super::cauchy::cauchy_slope;
-use super::draw::{log1p_square, standard};
+use super::draw::log1p_square;
 use super::param::{finite, positive};
 use super::{ParamError, Scalar, Slope, Support};
 use crate::rng::Stream;
@@ -37,15 +37,15 @@ impl Scalar for HalfCauchy {
 
     #[inline]
     fn log_density_num(&self, x: f64) -> f64 {
-        if x >= self.location {
-            self.log_norm - log1p_square(standard(x, self.location, self.scale))
+        if x >= self.location && x.is_finite() {
+            self.log_norm - log1p_square(x, self.location, self.scale)
         } else {
             f64::NEG_INFINITY
         }
     }
 
     fn slope(&self, x: f64) -> Slope {
-        cauchy_slope(standard(x, self.location, self.scale), self.scale)
+        cauchy_slope(x, self.location, self.scale)
     }
 
     fn number_mean(&self) -> Option<f64> {

@@ -39,13 +39,15 @@ impl Multinomial {
         let mut sum = rest(self.n);
         for (k, w) in xs.iter().zip(&self.weights) {
             let expected = self.n * (w / self.total);
-            if *k > 0.0 && expected == 0.0 {
-                return f64::NEG_INFINITY;
-            }
             if *k > 0.0 {
                 sum -= rest(*k);
             }
-            sum -= deviance(*k, expected);
+            // A share that no double holds has a logarithm, unless it is 0.
+            sum -= if *k > 0.0 && expected < f64::MIN_POSITIVE {
+                *k * (libm::log(*k) - libm::log(self.n) - libm::log(*w) + libm::log(self.total) - 1.0)
+            } else {
+                deviance(*k, expected)
+            };
         }
         sum
     }

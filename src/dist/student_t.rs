@@ -1,6 +1,6 @@
 //! Student's t distribution, with a location and a scale.
 
-use super::draw::{ln_gamma_draw, log1p_square, standard};
+use super::draw::{far_square, ln_gamma_draw, standard};
 use super::param::{finite, positive};
 use super::{ParamError, Scalar, Slope, Support};
 use crate::num::{digamma, ln_beta};
@@ -27,11 +27,15 @@ impl StudentT {
 }
 
 impl StudentT {
-    /// ln(1 + z^2 / df).
+    /// ln(1 + z^2 / df), z scales from the location.
     #[inline]
-    fn log_tail(&self, z: f64) -> f64 {
-        let t = z / self.df.sqrt();
-        if t.is_finite() { log1p_square(t) } else { 2.0 * libm::log(z.abs()) - libm::log(self.df) }
+    fn log_tail(&self, x: f64) -> f64 {
+        let t = standard(x, self.location, self.scale) / self.df.sqrt();
+        if t.abs() < 1e150 {
+            libm::log1p(t * t)
+        } else {
+            far_square(x, self.location, self.scale) - libm::log(self.df)
+        }
     }
 }
 
@@ -51,11 +55,10 @@ impl Scalar for StudentT {
 
     #[inline]
     fn log_density_num(&self, x: f64) -> f64 {
-        let z = standard(x, self.location, self.scale);
         if !x.is_finite() {
             return f64::NEG_INFINITY;
         }
-        self.log_norm - 0.5 * (self.df + 1.0) * self.log_tail(z)
+        self.log_norm - 0.5 * (self.df + 1.0) * self.log_tail(x)
     }
 
     fn slope(&self, x: f64) -> Slope {
@@ -69,8 +72,9 @@ impl Scalar for StudentT {
             ((df + 1.0) / (z + df / z), (df + 1.0) / (1.0 + df / z / z))
         };
         let norm = 0.5 * (digamma(0.5 * (df + 1.0)) - digamma(0.5 * df) - 1.0 / df);
-        let by_df = norm - 0.5 * self.log_tail(z) + 0.5 * twice / df;
-        Slope::new(-once / self.scale, [by_df, once / self.scale, (twice - 1.0) / self.scale])
+        let by_df = norm - 0.5 * self.log_tail(x) + 0.5 * twice / df;
+        let by_x = if z.is_finite() { once / self.scale } else { (df + 1.0) / (x - self.location) };
+        Slope::new(-by_x, [by_df, by_x, (twice - 1.0) / self.scale])
     }
 
     fn number_mean(&self) -> Option<f64> {

@@ -273,7 +273,7 @@ fn stick_gradient(n: usize, at: impl Fn(usize) -> f64, by: impl Fn(usize) -> f64
     // The sum of x_j dlogp/dx_j over the shares after k.
     let mut after = xs[n - 1] * by(n - 1);
     for k in (0..n - 1).rev() {
-        let z = crate::num::expit(at(k) - offset(n, k));
+        let z = crate::num::expit(near(at(k)) - offset(n, k));
         let own = xs[k] * by(k);
         // d log x_k = 1 - z; d log x_j = -z for j > k; the Jacobian has log z_k + log (1 - z_k) and log rest_j for j > k.
         let later = (n - 2 - k) as f64;

@@ -4,7 +4,7 @@ mpmath straight from the definitions, with so many digits that numbers 1e-300 an
 Columns: kind, name, parameters and point (space-separated doubles, taken as such), values, region. Kinds:
 * density: the log density; its region is `body`, or `tail` where an e-fold of distance from the centre holds less than e^-50 of the
   probability. What no double can hold is an infinity.
-* gradient: its derivatives by the value, if that is continuous, and by the parameters that are not integers.
+* gradient: its derivatives by the value, if that is continuous, and by the parameters; of some, such as bounds and integers, nan.
 * from: at these coordinates, the value and the log Jacobian, last; to: of this value, the coordinates.
 * covariance: a covariance function at a distance.
 * hilbert: the log determinant and the condition of Hilbert's matrix of this size, its entries rounded to doubles.
@@ -303,19 +303,19 @@ def densities():
                 inside = name not in ("uniform", "half_cauchy", "truncated_normal", "half_normal", "exponential", "laplace") or f(exactly * (1 - mpf(2) ** -900) - mpf(2) ** -2000, *p) > -inf and f(exactly * (1 + mpf(2) ** -900) + mpf(2) ** -2000, *p) > -inf
                 if not inside or (name == "laplace" and away == 0):
                     continue
-                if not discrete:
-                    slopes.append(derivative(lambda x: f(x, *p), exactly))
-                for i in range(len(p)):
-                    if i in integers or isinf(p[i]):
-                        continue
-                    slopes.append(derivative(lambda v: f(exactly, *p[:i], v, *p[i + 1 :]), p[i]))
-                if None not in slopes and slopes:
+                with mp.workdps(1500):
+                    if not discrete:
+                        slopes.append(derivative(lambda x: f(x, *p), exactly))
+                    for i in range(len(p)):
+                        known = i not in integers and not isinf(p[i])
+                        slopes.append(derivative(lambda v: f(exactly, *p[:i], v, *p[i + 1 :]), p[i]) if known else mpf("nan"))
+                if None not in slopes:
                     row("gradient", name, ps, [x], slopes, "body" if body else "tail")
 
 
 def derivative(f, at):
     """By a step far below the number, or, at 0, far below all doubles; none at an end of the parameters."""
-    h = abs(at) * mpf(10) ** -150 if at != 0 else mpf(10) ** -480
+    h = abs(at) * mpf(10) ** -300 if at != 0 else mpf(10) ** -620
     try:
         up, down = f(at + h), f(at - h)
     except ValueError:

@@ -90,8 +90,12 @@ impl Way for Annealed {
 
 /// The power at which half of the particles would count (by the effective number of equal weights), by bisection.
 fn next_power(likelihoods: &[f64], power: f64) -> f64 {
+    // Those so large that twice of them is no number are taken below the largest.
+    let most = likelihoods.iter().copied().filter(|l| l.is_finite()).fold(f64::NEG_INFINITY, f64::max);
+    let from = if most.abs() > 1e300 { most } else { 0.0 };
     let enough = |to: f64| {
-        let weights: Vec<f64> = likelihoods.iter().filter(|l| l.is_finite()).map(|l| (to - power) * l).collect();
+        let relative = |l: &f64| (to - power) * (l - from);
+        let weights: Vec<f64> = likelihoods.iter().filter(|l| l.is_finite()).map(relative).collect();
         let twice: Vec<f64> = weights.iter().map(|w| 2.0 * w).collect();
         2.0 * log_sum_exp(&weights) - log_sum_exp(&twice) >= libm::log(0.5 * weights.len().max(1) as f64)
     };

@@ -12,6 +12,14 @@ const GAMMA: f64 = 0.05;
 const T0: f64 = 10.0;
 const KAPPA: f64 = 0.75;
 
+/// The logarithms of the shortest and the longest step that is learnt.
+const SHORTEST: f64 = -350.0;
+const LONGEST: f64 = 10.0;
+
+/// The first step is found by so many doublings, a density that is flat having no step that is too long, or by so many halvings.
+const DOUBLINGS: u32 = 40;
+const HALVINGS: u32 = 400;
+
 /// The first states are left out of variances; then comes the first window.
 const BURN: u32 = 30;
 const WINDOW: u32 = 25;
@@ -108,8 +116,8 @@ impl Adaptation {
         let log_step = self.mean_log - self.bias * self.rounds.sqrt() / GAMMA;
         let share = libm::pow(self.rounds, -KAPPA);
         let log_averaged = share * log_step + (1.0 - share) * libm::log(self.averaged.max(f64::MIN_POSITIVE));
-        self.step = libm::exp(log_step.clamp(-30.0, 10.0));
-        self.averaged = if self.rounds == 1.0 { self.step } else { libm::exp(log_averaged.clamp(-30.0, 10.0)) };
+        self.step = libm::exp(log_step.clamp(SHORTEST, LONGEST));
+        self.averaged = if self.rounds == 1.0 { self.step } else { libm::exp(log_averaged.clamp(SHORTEST, LONGEST)) };
         self.seen = self.seen.saturating_add(1);
         if self.seen > BURN {
             self.count += 1.0;
@@ -144,7 +152,10 @@ impl Adaptation {
     fn restart(&mut self, system: &mut System, here: &Point, rng: &mut Stream) -> TraceResult<()> {
         let mut step = if self.averaged > 0.0 { self.averaged } else { 0.5 / (system.dimensions() as f64).powf(0.25) };
         let mut direction = 0.0;
-        for _ in 0..40 {
+        for round in 0..HALVINGS {
+            if direction > 0.0 && round >= DOUBLINGS {
+                break;
+            }
             let from = system.launch(here, &self.inverse_mass, rng);
             let start = system::kinetic(&from, &self.inverse_mass);
             let ratio = match system.leapfrog(&from, step, &self.inverse_mass)? {
