@@ -66,7 +66,8 @@ impl Scalar for Beta {
         let all = digamma(a + b);
         let left = if a == 1.0 { 0.0 } else { (a - 1.0) / x };
         let right = if b == 1.0 { 0.0 } else { (b - 1.0) / (1.0 - x) };
-        let floor = f64::MIN_POSITIVE;
+        // At a pole of the derivative, that at the least double.
+        let floor = f64::from_bits(1);
         let by_a = libm::log(x.max(floor)) + all - digamma(a);
         Slope::new(left - right, [by_a, libm::log1p(-x).max(f64::MIN) + all - digamma(b)])
     }

@@ -48,6 +48,11 @@ def mixture(x, a, b, m, s, n, t):
     return most + log(exp(first - most) + exp(second - most))
 
 
+def truncated_normal(x, m, s, lo, hi):
+    with mp.workdps(max(2000, mp.dps)):
+        return ordinary.normal(x, m, s) - log(ordinary.phi_integral((lo - m) / s, (hi - m) / s)) if lo <= x <= hi else -inf
+
+
 def scaled(*families):
     """Location 0, far points and near ones in units of the scale."""
     return [(p, [s * z for z in DISTANCES if abs(s * z) < 1e308] + [1e-300, -1e300]) for s in SCALES for p in [f(s) for f in families]]
@@ -78,7 +83,7 @@ DENSITIES = {
     "laplace": (ordinary.laplace, lambda m, s: m, [], False, scaled(lambda s: (0.0, s)) + grid([(1e300, 1e300), (-1e300, 1.0)], [0.0, 1e300, -1e300])),
     "von_mises": (von_mises, lambda m, k: m, [], False, grid([(0, 0), (0, 1e-300), (0.5, 1e-10), (0.5, 50), (0.5, 1e10), (0, 1e16), (0, 1e150), (0, 1e300), (0.5, 1e300)], ANGLES)),
     "weibull": (ordinary.weibull, lambda k, s: 0, [], False, grid([(1e-2, 1), (1e-300, 1), (1, 1e-300), (1, 1e300), (2, 1e-150), (1e5, 1), (1e10, 2.5), (0.5, 1e150)], POSITIVE)),
-    "truncated_normal": (ordinary.truncated_normal, lambda m, s, a, b: a if a > -inf else m, [2, 3], False, grid(
+    "truncated_normal": (truncated_normal, lambda m, s, a, b: a if a > -inf else m, [2, 3], False, grid(
         [(0, 1, -inf, inf), (0, 1, 0, inf), (0, 1, 38, inf), (0, 1, 1e10, inf), (0, 1, 1e140, inf), (0, 1, -inf, -1e10), (0, 1e300, -1e300, 1e300), (0, 1e-300, 0, 1e-300),
          (0, 1e-300, -1e-299, 1e-160), (0, 1, -1e-300, 1e-300), (0, 1, 40, 40.1), (1e300, 1e299, 0, 1e300), (0, 1, 1, 1.0000000000000002), (0, 1, -1e-10, 1e140)],
         [0.0, 1e-300, 5e-301, -1e-299, 1e-160, 0.5, 1.0, 38.0, 38.5, 40.0, 40.05, 60.0, 1e10, 10000000000.1, -1e10, 1e140, 1.1e140, 1e299, 9.5e299, -1e300])),
@@ -301,7 +306,8 @@ def densities():
                     continue
                 slopes = []
                 inside = name not in ("uniform", "half_cauchy", "truncated_normal", "half_normal", "exponential", "laplace") or f(exactly * (1 - mpf(2) ** -900) - mpf(2) ** -2000, *p) > -inf and f(exactly * (1 + mpf(2) ** -900) + mpf(2) ** -2000, *p) > -inf
-                if not inside or (name == "laplace" and away == 0):
+                # At a kink, and where the density is narrower than the step below.
+                if not inside or (name == "laplace" and away == 0) or (name == "lognormal" and ps[1] < 1e-200):
                     continue
                 with mp.workdps(1500):
                     if not discrete:

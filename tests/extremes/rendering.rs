@@ -96,7 +96,8 @@ fn as_by_rays(solid: &Solid, camera: &Camera) -> Result<f64, String> {
                 }
             }
             let (least, most) = around.map(depth).into_iter().fold((f64::INFINITY, 0.0f64), |(l, m), d| (l.min(d), m.max(d)));
-            if !(got >= least - DEPTH_ERROR * unit(least) && got <= most + DEPTH_ERROR * unit(most)) {
+            let within = |depth: f64| if depth.is_finite() { DEPTH_ERROR * unit(depth) } else { 0.0 };
+            if !(got >= least - within(least) && got <= most + within(most)) {
                 return Err(format!("pixel {column}, {row}: {got}, rays {least} to {most}"));
             }
         }

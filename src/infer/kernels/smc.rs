@@ -17,6 +17,9 @@ use crate::trace::{Selector, Trace, TraceResult};
 /// The most powers: a likelihood that needs more has no support where the prior has.
 const MOST_POWERS: usize = 1000;
 
+/// Log weights beyond this are weighed below the largest.
+const LARGE: f64 = 1e9;
+
 /// Particle independent Metropolis-Hastings around a kernel.
 pub type Smc = Independent<Annealed>;
 
@@ -77,7 +80,9 @@ impl Way for Annealed {
                 return Ok((particles, total));
             }
             let within = at.within((1 << 32) + rung as u64);
-            let shares: Vec<f64> = weights.iter().map(|w| libm::exp(w - total)).collect();
+            let most = weights.iter().copied().fold(f64::NEG_INFINITY, f64::max);
+            let whole = if most.abs() > LARGE { most } else { total };
+            let shares: Vec<f64> = weights.iter().map(|w| libm::exp(w - whole)).collect();
             let chosen = systematic(&shares, self.particles, &mut within.stream());
             particles = chosen.into_iter().map(|i| particles[i].clone()).collect();
             for (i, p) in particles.iter_mut().enumerate() {
@@ -90,9 +95,9 @@ impl Way for Annealed {
 
 /// The power at which half of the particles would count (by the effective number of equal weights), by bisection.
 fn next_power(likelihoods: &[f64], power: f64) -> f64 {
-    // Those so large that twice of them is no number are taken below the largest.
+    // Beside those that are large the logarithm of their number would be lost: they are taken below the largest.
     let most = likelihoods.iter().copied().filter(|l| l.is_finite()).fold(f64::NEG_INFINITY, f64::max);
-    let from = if most.abs() > 1e300 { most } else { 0.0 };
+    let from = if most.abs() > LARGE { most } else { 0.0 };
     let enough = |to: f64| {
         let relative = |l: &f64| (to - power) * (l - from);
         let weights: Vec<f64> = likelihoods.iter().filter(|l| l.is_finite()).map(relative).collect();
