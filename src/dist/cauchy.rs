@@ -51,11 +51,7 @@ impl Scalar for Cauchy {
 
     #[inline]
     fn log_density_num(&self, x: f64) -> f64 {
-        if x.is_finite() {
-            self.log_norm - log1p_square(x, self.location, self.scale)
-        } else {
-            f64::NEG_INFINITY
-        }
+        if x.is_finite() { self.log_norm - log1p_square(x, self.location, self.scale) } else { f64::NEG_INFINITY }
     }
 
     fn slope(&self, x: f64) -> Slope {

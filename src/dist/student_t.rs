@@ -31,11 +31,7 @@ impl StudentT {
     #[inline]
     fn log_tail(&self, x: f64) -> f64 {
         let t = standard(x, self.location, self.scale) / self.df.sqrt();
-        if t.abs() < 1e150 {
-            libm::log1p(t * t)
-        } else {
-            far_square(x, self.location, self.scale) - libm::log(self.df)
-        }
+        if t.abs() < 1e150 { libm::log1p(t * t) } else { far_square(x, self.location, self.scale) - libm::log(self.df) }
     }
 }
 

@@ -156,7 +156,9 @@ impl DepthLikelihood {
             }
             let z = (o - r) / self.sd;
             let good = libm::log1p(-self.outlier) - 0.5 * z * z - libm::log(self.sd) - LN_SQRT_2PI;
-            libm::exp(good - self.log_density(o, r)) * z / self.sd
+            let share = libm::exp(good - self.log_density(o, r));
+            // Where nothing is left of the good part, z may be infinite.
+            if share > 0.0 { share * z / self.sd } else { 0.0 }
         };
         self.observed.data.iter().zip(rendered).map(slope).collect()
     }

@@ -49,9 +49,7 @@ pub fn made(family: &str, p: &[f64]) -> Dist {
 pub fn datum(family: &str, x: &[f64]) -> Datum {
     match x {
         [x] => Datum::Num(*x),
-        rows if matches!(family, "lkj" | "wishart") => {
-            Datum::List(rows.chunks(3).map(|r| r.to_vec().into()).collect())
-        }
+        rows if matches!(family, "lkj" | "wishart") => Datum::List(rows.chunks(3).map(|r| r.to_vec().into()).collect()),
         _ => x.to_vec().into(),
     }
 }

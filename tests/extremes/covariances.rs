@@ -3,8 +3,8 @@
 use super::points::Points;
 use super::table::{agree, rows};
 use nalgebra::DMatrix;
-use pcadlang::dist::{Covariance, Datum, Gp, MvNormal};
 use pcadlang::dist::Distribution as _;
+use pcadlang::dist::{Covariance, Datum, Gp, MvNormal};
 
 fn function(name: &str, p: &[f64]) -> Covariance {
     match (name, p) {
@@ -152,7 +152,9 @@ fn matrices_of_any_condition_factor_or_say_so() {
         let end = at_zero(&k).map(|(_, p)| p);
         // det = 1/2 times the squares of the units, which cancel.
         let expected = -0.5 * (0.5f64.ln() + 3.0 * LN_TAU);
-        points.check(end.as_ref().is_ok_and(|p| agree(*p, expected, 1e-12, 0.0)), || format!("units to {far:e}: {end:?}"));
+        points.check(end.as_ref().is_ok_and(|p| agree(*p, expected, 1e-12, 0.0)), || {
+            format!("units to {far:e}: {end:?}")
+        });
     }
     let (inf, nan) = (f64::INFINITY, f64::NAN);
     let bad = [
@@ -169,7 +171,9 @@ fn matrices_of_any_condition_factor_or_say_so() {
     ];
     for entries in bad {
         let end = at_zero(&DMatrix::from_row_slice(2, 2, &entries));
-        points.check(end.as_ref().is_err_and(|e| e.contains("mv_normal: cov must be")), || format!("{entries:?}: {end:?}"));
+        points.check(end.as_ref().is_err_and(|e| e.contains("mv_normal: cov must be")), || {
+            format!("{entries:?}: {end:?}")
+        });
     }
     points.finish();
 }

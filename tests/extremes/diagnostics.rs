@@ -2,7 +2,9 @@
 
 use super::points::Points;
 use super::table::agree;
-use pcadlang::infer::diagnostics::{Summary, ess_bulk, ess_mean, ess_quantile, ess_tail, mcse_mean, mcse_sd, modes, quantile, r_hat, summary};
+use pcadlang::infer::diagnostics::{
+    Summary, ess_bulk, ess_mean, ess_quantile, ess_tail, mcse_mean, mcse_sd, modes, quantile, r_hat, summary,
+};
 use pcadlang::rng::{Purpose, StreamKey};
 
 /// Autocorrelated chains of about standard normal draws.
@@ -110,7 +112,13 @@ fn outcomes_are_stated() {
     }
     // Two places that chains stay at, however far apart or near.
     for (here, there) in [(1e-300, 2e-300), (-1e300, 1e300), (0.0, 1.0), (-f64::MAX, f64::MAX)] {
-        let at = |c: f64| chains().iter().map(|x| x.iter().map(|x| c + 1e-3 * c.abs() * x).map(|x| x.clamp(f64::MIN, f64::MAX)).collect()).take(2).collect::<Vec<Vec<f64>>>();
+        let at = |c: f64| {
+            chains()
+                .iter()
+                .map(|x| x.iter().map(|x| c + 1e-3 * c.abs() * x).map(|x| x.clamp(f64::MIN, f64::MAX)).collect())
+                .take(2)
+                .collect::<Vec<Vec<f64>>>()
+        };
         let x = [at(here), at(there)].concat();
         let r = r_hat(&x);
         points.check(r > 1.5, || format!("R-hat of {here:e} and {there:e}: {r}"));

@@ -125,12 +125,15 @@ fn means_are_right_at_every_scale() {
     let seen = |z: f64| normal_pdf(1.0, z, 1.0) * normal_pdf(z, 0.0, 1000.0);
     let normal = |z: f64| seen(z) * normal_pdf(z, 0.0, 1.0);
     let positive = |z: f64| seen(z) * normal_pdf(z.ln(), 0.0, 1.0) / z;
-    let mean = |f: &dyn Fn(f64) -> f64, from| {
-        integrate(|z| z * f(z), from, 20.0, 40_000) / integrate(f, from, 20.0, 40_000)
-    };
+    let mean =
+        |f: &dyn Fn(f64) -> f64, from| integrate(|z| z * f(z), from, 20.0, 40_000) / integrate(f, from, 20.0, 40_000);
     let cases: [(usize, f64, &[&str]); 2] = [
         (0, mean(&normal, -20.0), &["mh(@x)", "block(@x)", "elliptical(@x)", "wide()"]),
-        (6, mean(&positive, 1e-9), &["mh(@x)", "drift(@x)", "hmc(@x, steps = 4)", "mala(@x)", "nuts(@x)", "slice(@x)", "scaled()"]),
+        (
+            6,
+            mean(&positive, 1e-9),
+            &["mh(@x)", "drift(@x)", "hmc(@x, steps = 4)", "mala(@x)", "nuts(@x)", "slice(@x)", "scaled()"],
+        ),
     ];
     for (posterior, expected, kernels) in cases {
         for kernel in kernels {

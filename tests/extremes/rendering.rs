@@ -64,7 +64,8 @@ fn ray(camera: &Camera, x: f64, y: f64) -> (DVec3, DVec3) {
 /// The nearest hit beyond the near plane: its depth and face.
 fn nearest<'a>(faces: &'a [Face], camera: &Camera, x: f64, y: f64) -> Option<(f64, &'a Face)> {
     let (eye, ray) = ray(camera, x, y);
-    let hits = faces.iter().filter_map(|f| f.hit(eye, ray).filter(|h| h.0 >= Camera::NEAR && h.1 >= 0.0).map(|h| (h.0, f)));
+    let hits =
+        faces.iter().filter_map(|f| f.hit(eye, ray).filter(|h| h.0 >= Camera::NEAR && h.1 >= 0.0).map(|h| (h.0, f)));
     hits.min_by(|a, b| a.0.total_cmp(&b.0))
 }
 
@@ -79,7 +80,17 @@ fn as_by_rays(solid: &Solid, camera: &Camera) -> Result<f64, String> {
         for column in 0..camera.width {
             let (x, y) = (f64::from(column) + 0.5, f64::from(row) + 0.5);
             let got = f64::from(frame.depth[(row * camera.width + column) as usize]);
-            let around = [(0.0, 0.0), (1.0, 0.0), (-1.0, 0.0), (0.0, 1.0), (0.0, -1.0), (1.0, 1.0), (1.0, -1.0), (-1.0, 1.0), (-1.0, -1.0)];
+            let around = [
+                (0.0, 0.0),
+                (1.0, 0.0),
+                (-1.0, 0.0),
+                (0.0, 1.0),
+                (0.0, -1.0),
+                (1.0, 1.0),
+                (1.0, -1.0),
+                (-1.0, 1.0),
+                (-1.0, -1.0),
+            ];
             let depth = |(i, j): (f64, f64)| {
                 nearest(&faces, camera, x + PLACE_ERROR * i, y + PLACE_ERROR * j).map_or(f64::INFINITY, |h| h.0)
             };
@@ -95,7 +106,8 @@ fn as_by_rays(solid: &Solid, camera: &Camera) -> Result<f64, String> {
                     worst = worst.max(error);
                 }
             }
-            let (least, most) = around.map(depth).into_iter().fold((f64::INFINITY, 0.0f64), |(l, m), d| (l.min(d), m.max(d)));
+            let (least, most) =
+                around.map(depth).into_iter().fold((f64::INFINITY, 0.0f64), |(l, m), d| (l.min(d), m.max(d)));
             let within = |depth: f64| if depth.is_finite() { DEPTH_ERROR * unit(depth) } else { 0.0 };
             if !(got >= least - within(least) && got <= most + within(most)) {
                 return Err(format!("pixel {column}, {row}: {got}, rays {least} to {most}"));
@@ -166,10 +178,13 @@ fn sound(solid: &Solid, camera: &Camera) -> Result<usize, String> {
 
 /// Powers of ten from 1e-300 to 1e300.
 fn magnitudes() -> Vec<f64> {
-    [-300, -200, -150, -100, -46, -40, -38, -30, -20, -10, -6, -3, -1, 0, 1, 3, 6, 10, 18, 19, 20, 30, 38, 39, 46, 77, 100, 150, 154, 200, 300]
-        .iter()
-        .map(|p| 10f64.powi(*p))
-        .collect()
+    [
+        -300, -200, -150, -100, -46, -40, -38, -30, -20, -10, -6, -3, -1, 0, 1, 3, 6, 10, 18, 19, 20, 30, 38, 39, 46,
+        77, 100, 150, 154, 200, 300,
+    ]
+    .iter()
+    .map(|p| 10f64.powi(*p))
+    .collect()
 }
 
 #[test]
@@ -224,7 +239,8 @@ fn objects_of_any_size_and_place_are_drawn() {
 fn meshes_of_any_numbers_are_drawn() {
     let mut points = Points::of("meshes of any numbers");
     let camera = Camera::default_for(40, 30);
-    let corners = [Vec3::new(-0.7, -0.6, 0.2), Vec3::new(0.8, -0.5, -0.4), Vec3::new(0.1, 0.9, 0.3), Vec3::new(0.2, 0.1, 7.0)];
+    let corners =
+        [Vec3::new(-0.7, -0.6, 0.2), Vec3::new(0.8, -0.5, -0.4), Vec3::new(0.1, 0.9, 0.3), Vec3::new(0.2, 0.1, 7.0)];
     let raw = |positions: Vec<Vec3>| {
         let triangles = vec![[0, 1, 2], [0, 1, 3], [1, 2, 3], [0, 2, 3]];
         let normals = vec![Vec3::Z; positions.len()];

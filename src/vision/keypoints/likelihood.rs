@@ -76,7 +76,9 @@ impl KeypointLikelihood {
 
     /// The probability that a detection of this confidence is off.
     pub fn outlier(&self, confidence: f64) -> f64 {
-        1.0 - confidence.clamp(0.0, 1.0) * (1.0 - self.outlier)
+        // Written so that NaN counts as no confidence.
+        let confidence = if confidence > 0.0 { confidence.min(1.0) } else { 0.0 };
+        1.0 - confidence * (1.0 - self.outlier)
     }
 
     /// The logs of the two parts of the density.
