@@ -3,7 +3,8 @@
 use super::points::Points;
 use super::table::{agree, rows};
 use crate::common::families::{datum, made};
-use pcadlang::dist::Datum;
+use pcadlang::dist::{Categorical, Datum, Dist, Flat, Flip, Iid, Ordered};
+use std::sync::Arc;
 
 #[test]
 fn log_densities_agree_with_the_table() {
@@ -64,6 +65,47 @@ fn nothing_is_likely_that_is_not_finite() {
         }
         let other = Datum::Bool(true);
         points.check(d.log_density(&other) == f64::NEG_INFINITY, || format!("{this} at {other:?}"));
+    }
+    points.finish();
+}
+
+/// Those whose log density is a line to write down.
+#[test]
+fn log_densities_agree_with_formulas() {
+    let mut points = Points::of("other log densities");
+    let never = f64::NEG_INFINITY;
+    for x in [0.0, 5e-324, -1e-300, 1e150, 1e300, f64::MAX, f64::INFINITY, never, f64::NAN] {
+        let got = Dist::Flat(Flat).log_density_num(x);
+        points.check(got == if x.is_finite() { 0.0 } else { never }, || format!("flat at {x}: {got}"));
+    }
+    for p in [0.0, 5e-324, 1e-300, 1e-16, 1.0 - 1e-16, 1.0f64] {
+        let d = Dist::Flip(Flip::new(p).unwrap());
+        for (x, expected) in [(true, p.ln()), (false, (-p).ln_1p())] {
+            let got = d.log_density_bool(x);
+            points.check(agree(got, expected, 1e-12, 0.0), || format!("flip({p:e}) at {x}: {got}"));
+        }
+    }
+    for weights in [[1e-300, 1e300, 0.0], [1e-300; 3], [5e-324, 1.0, 1.0], [5e307; 3]] {
+        let d = Dist::Categorical(Categorical::new(weights).unwrap());
+        for x in [0.0, 1.0, 2.0, 3.0, -1.0, 0.5, 1e300, f64::NAN] {
+            let weight = (0..3).find(|i| *i as f64 == x).map_or(0.0, |i| weights[i]);
+            let (got, expected) = (d.log_density_num(x), weight.ln() - weights.iter().sum::<f64>().ln());
+            points.check(agree(got, expected, 1e-12, 1e-12), || format!("categorical({weights:?}) at {x}: {got}"));
+        }
+    }
+    for scale in [1e-300, 1e-150, 1.0, 1e150, 1e300] {
+        let one = made("normal", &[0.0, scale]);
+        let xs = [-scale, 0.5 * scale, 2.0 * scale];
+        let sum: f64 = xs.iter().map(|x| one.log_density_num(*x)).sum();
+        let iid = Dist::Iid(Arc::new(Iid::new(one.clone(), 3).unwrap()));
+        let ordered = Dist::Ordered(Arc::new(Ordered::new(one, 3).unwrap()));
+        let cases = [(&iid, xs, sum), (&ordered, xs, sum + 6f64.ln()), (&ordered, [xs[1], xs[0], xs[2]], never)];
+        for (d, x, expected) in cases {
+            let got = d.log_density(&x.to_vec().into());
+            points.check(agree(got, expected, 1e-12, 1e-12), || {
+                format!("{} of scale {scale:e} at {x:?}: {got}", d.name())
+            });
+        }
     }
     points.finish();
 }
