@@ -272,7 +272,7 @@ impl Registered {
 
 /// The Metropolis-Hastings test. A ratio that is NaN, which would be a rejection, is a mistake of the kernel.
 pub(crate) fn accepts(log_ratio: f64, rng: &mut Stream) -> bool {
-    assert!(!log_ratio.is_nan());
+    debug_assert!(!log_ratio.is_nan());
     let u = rng.open_uniform();
     log_ratio >= 0.0 || libm::log(u) < log_ratio
 }

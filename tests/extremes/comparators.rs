@@ -200,7 +200,7 @@ fn depths_masks_and_keypoints_score_anything() {
     let mut points = Points::of("depth, masks, keypoints");
     let (nan, inf) = (f32::NAN, f32::INFINITY);
     let observed = DepthMap::new(4, 2, vec![1.0, 2.0, 1e-30, 1e30, nan, inf, 0.5, 0.0]).unwrap();
-    let rendered = [1.0, f32::MAX, 1e-45, 1e30, 1.0, inf, nan, 5.0];
+    let rendered = [1.0, f32::MAX, 1e-45, 1e30, 1.0, inf, 2.0, 5.0];
     for sd in SPREADS {
         let likelihood = DepthLikelihood::new(&observed, sd, 0.05, (0.0, 1e38));
         let p = likelihood.as_ref().ok().and_then(|l| l.log_likelihood(&rendered, 4, 2).ok());

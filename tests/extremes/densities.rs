@@ -28,13 +28,17 @@ fn gradients_agree_with_the_table() {
         let is_discrete = got.len() == r.parameters.len();
         let by = if is_discrete { &[][..] } else { &r.point[..] }.iter().chain(&r.parameters);
         // Or of 1e-9 in the change of the log density while the number changes by a factor of e; with terms as large as a shape,
-        // 1e-12 of it.
+        // or as the square of how far a bound is in standard deviations, 1e-12 of it.
         let shapes = match r.name {
             "beta" => 2,
             "gamma" | "inv_gamma" | "student_t" => 1,
             _ => 0,
         };
-        let little = r.parameters[..shapes].iter().fold(1e3, |most: f64, s| most.max(*s)) * 1e-12;
+        let bound = match (r.name, &r.parameters[..]) {
+            ("truncated_normal", [mean, sd, lo, _]) if lo.is_finite() => ((lo - mean) / sd).powi(2),
+            _ => 0.0,
+        };
+        let little = r.parameters[..shapes].iter().fold(bound.max(1e3), |most: f64, s| most.max(*s)) * 1e-12;
         let right = got.len() == r.values.len()
             && r.values.iter().zip(&got).zip(by).all(|((v, g), by)| {
                 v.is_nan() && !g.is_nan() || agree(*g, *v, 1e-9, 0.0) || ((v - g) * by).abs() < little
