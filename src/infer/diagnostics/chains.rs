@@ -89,7 +89,9 @@ mod tests {
     fn split_leaves_out_the_middle_draw() {
         let c = Chains::new(&[vec![1., 2., 3., 4., 5.], vec![6., 7., 8., 9., 10.]]).unwrap();
         let s = c.split();
-        assert_eq!(s.iter().collect::<Vec<_>>(), [&[1., 2.][..], &[6., 7.], &[4., 5.], &[9., 10.]]);
+        let draws: Vec<Vec<f64>> = s.iter().map(|c| c.iter().map(|x| x * s.unit()).collect()).collect();
+        assert_eq!(draws, [[1., 2.], [6., 7.], [4., 5.], [9., 10.]]);
+        assert_eq!(s.unit(), 8.0);
     }
 
     #[test]
