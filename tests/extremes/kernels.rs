@@ -229,7 +229,7 @@ fn the_running_score_is_that_of_a_fresh_run() {
 }
 
 #[test]
-#[ignore = "half a minute"]
+#[ignore = "a minute"]
 fn the_running_score_is_that_of_a_fresh_run_after_ten_million_steps() {
     let mut points = Points::of("running scores after 1e7 steps");
     score_is_kept(&mut points, 10_000_000, 0..1);
