@@ -8,7 +8,7 @@ use super::looked::Looked;
 use super::project::{DepthRange, Placement, Projected, project};
 use super::trace::{Room, trace_mesh};
 use super::visibility::{Depths, Piece};
-use super::{Camera, layers};
+use super::{Camera, backdrop, layers};
 use crate::geom::Solid;
 use std::cell::RefCell;
 
@@ -53,7 +53,9 @@ impl Contours {
     /// The contours of a solid, seen in a camera's image. Draws its own depth image; of a solid of several meshes, only
     /// what this thread has not drawn lately.
     pub fn of(solid: &Solid, camera: &Camera) -> Contours {
-        layers::contours(solid, camera).unwrap_or_else(|| Contours::drawn(solid, camera))
+        backdrop::contours(solid, camera)
+            .or_else(|| layers::contours(solid, camera))
+            .unwrap_or_else(|| Contours::drawn(solid, camera))
     }
 
     /// As [`Contours::of`], everything drawn anew.

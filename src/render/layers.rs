@@ -33,14 +33,14 @@ const BYTES: usize = 32 << 20;
 
 /// What one mesh adds to a picture.
 #[derive(Default)]
-struct Layer {
-    area: Area,
+pub(super) struct Layer {
+    pub area: Area,
     /// Depth in the area, row by row, infinite off the mesh.
     depth: Vec<f32>,
-    range: DepthRange,
-    pieces: Vec<Piece>,
+    pub range: DepthRange,
+    pub pieces: Vec<Piece>,
     /// Holds all pixels that the pieces look at.
-    looks: Area,
+    pub looks: Area,
     /// The pieces seen in the picture it was shown in last.
     seen: Contours,
 }
@@ -101,7 +101,7 @@ thread_local! {
 
 /// The contours of a solid, composed of layers; `None` for solids that are better drawn at once.
 pub(super) fn contours(solid: &Solid, camera: &Camera) -> Option<Contours> {
-    let count = solid.instances().len();
+    let count = solid.mesh_count();
     let most_bytes = camera.pixels().saturating_mul(count).saturating_mul(size_of::<f32>());
     if !(FEWEST..=MOST).contains(&count) || most_bytes > BYTES {
         return None;
@@ -173,13 +173,7 @@ impl Layers {
         }
         let gone = self.shown.drain(solid.instances().len().min(self.shown.len())..);
         self.dirty.extend(gone.map(|shown| shown.area));
-        self.dirty.retain(|area| area.pixels() > 0);
-        // Where much has changed, areas overlap: one around them all is less.
-        let around = self.dirty.iter().fold(Area::default(), |all, area| all.with(area));
-        if self.dirty.iter().map(Area::pixels).sum::<usize>() > around.pixels() {
-            self.dirty.clear();
-            self.dirty.push(around);
-        }
+        Area::join(&mut self.dirty);
         let Layers { dirty, depth, shown, slots, .. } = self;
         for area in dirty {
             for row in area.top..area.bottom {
@@ -229,7 +223,7 @@ impl Layers {
 
 impl Layer {
     /// Draws a mesh alone.
-    fn draw(
+    pub fn draw(
         &mut self,
         instance: &Instance,
         camera: &Camera,
@@ -251,7 +245,7 @@ impl Layer {
 
     /// Puts what is nearer than the picture into it, in some area.
     #[inline(always)]
-    fn show(&self, picture: &mut [f32], width: usize, within: &Area) {
+    pub fn show(&self, picture: &mut [f32], width: usize, within: &Area) {
         let area = self.area.common(within);
         if area.pixels() == 0 {
             return;
@@ -275,6 +269,16 @@ impl Layer {
 }
 
 impl Area {
+    /// Leaves out those without pixels. Where much has changed, areas overlap: then one around them all is less.
+    pub(super) fn join(areas: &mut Vec<Area>) {
+        areas.retain(|area| area.pixels() > 0);
+        let around = areas.iter().fold(Area::default(), |all, area| all.with(area));
+        if areas.iter().map(Area::pixels).sum::<usize>() > around.pixels() {
+            areas.clear();
+            areas.push(around);
+        }
+    }
+
     /// A rectangle with all pixels that pieces look at.
     fn looked_at(pieces: &[Piece], camera: &Camera) -> Area {
         let ends = |side: u32, at: fn(&Piece) -> f32| {
@@ -292,11 +296,11 @@ impl Area {
     }
 }
 
-fn affine_bits(affine: &Affine) -> [u64; 12] {
+pub(super) fn affine_bits(affine: &Affine) -> [u64; 12] {
     affine.0.to_cols_array().map(f64::to_bits)
 }
 
-fn camera_bits(camera: &Camera) -> [u64; 17] {
+pub(super) fn camera_bits(camera: &Camera) -> [u64; 17] {
     let (kind, scale, cx, cy) = match camera.projection {
         Projection::Pinhole { focal_px, cx, cy } => (0, focal_px, cx, cy),
         Projection::Orthographic { units_per_pixel, cx, cy } => (1, units_per_pixel, cx, cy),

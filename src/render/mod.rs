@@ -3,6 +3,7 @@
 //! Not here: meshes and transforms (`geom`), comparing pictures (`vision`). Nothing in this module draws random
 //! numbers, and the same input gives the same output on every machine.
 
+mod backdrop;
 mod batch;
 mod camera;
 mod camera_json;
@@ -38,6 +39,7 @@ mod testing;
 
 use crate::num::simd;
 
+pub use backdrop::Change;
 pub use batch::{BatchRenderer, ContourBatch, ContourSlice, Cores, Scene};
 pub use camera::{Camera, CameraError, Projection};
 pub use contours::Contours;

@@ -1,0 +1,493 @@
+//! Contours of a scene most of which stands still. The meshes that have not moved make a **backdrop**: its depth, and its pieces of contour
+//! that it does not hide itself, by the pixels that they look at. When one of the others moves, depth is composed anew where it was and is, and only the
+//! pieces that look there are looked at again; what came and went is told as a [`Change`]. So a picture costs what moves, not what is in it.
+//!
+//! Invariant: as for [`super::layers`], contours are those drawn at once, bit for bit. That rests on looks being monotone: what another mesh
+//! or a smaller depth range hides stays hidden with both, in `f64` too.
+
+use super::Camera;
+use super::candidates::Candidates;
+use super::contours::Contours;
+use super::layers::{Layer, affine_bits, camera_bits};
+use super::project::{DepthRange, Projected};
+use super::raster::Area;
+use super::simd::vectorised;
+use super::trace::Room;
+use super::visibility::{Depths, Piece};
+use crate::geom::{Instance, Mesh, MeshesMark, Solid};
+use std::cell::RefCell;
+use std::sync::{Arc, Weak};
+
+/// A solid of fewer meshes is drawn at once: each is likely to have moved.
+const FEWEST: usize = 3;
+
+/// Memory of a backdrop, in pieces; a scene of more is drawn at once.
+const MOST_PIECES: usize = 1 << 19;
+
+/// How many drawings later a scene of which most moved is looked at again.
+const PATIENCE: u32 = 1024;
+
+/// What a drawing's contours have more and less than those of the drawing before, by the same thread in the same picture.
+#[derive(Debug)]
+pub struct Change {
+    /// Stands for the contours before; another one, that nobody has, where everything came.
+    pub from: Arc<()>,
+    /// Stands for the contours now.
+    pub to: Arc<()>,
+    /// Pieces that are no longer seen.
+    pub gone: Contours,
+    /// Pieces that were not seen before.
+    pub come: Contours,
+    /// How many pieces are seen now.
+    pub count: usize,
+}
+
+/// A mesh of the solid, as it was drawn last.
+struct Leaf {
+    mesh: Weak<Mesh>,
+    affine: [u64; 12],
+    moves: bool,
+}
+
+/// A list of meshes of the solid that was drawn last, and the number of its first one.
+struct Known {
+    list: MeshesMark,
+    first: usize,
+    count: usize,
+}
+
+/// A layer and whose it is.
+#[derive(Default)]
+struct Own {
+    mesh: Weak<Mesh>,
+    affine: [u64; 12],
+    layer: Layer,
+}
+
+/// A mesh that has moved: its layer where it is, and where it was before.
+#[derive(Default)]
+struct Mover {
+    leaf: usize,
+    now: Own,
+    before: Own,
+    seen: Contours,
+}
+
+/// A piece of the backdrop.
+struct Live {
+    piece: Piece,
+    leaf: usize,
+    shown: bool,
+}
+
+/// What stands still.
+#[derive(Default)]
+struct Still {
+    depth: Vec<f32>,
+    range: DepthRange,
+    /// All pieces, with the number of their mesh.
+    pieces: Vec<(Piece, usize)>,
+    /// The depth ranges of the scene for which the rest holds.
+    extents: [f64; 2],
+    /// Half the width of those, relatively.
+    width: f64,
+    /// Pieces that the backdrop does not hide at the greatest of these depth ranges.
+    live: Vec<Live>,
+    /// Of those, the ones it hides at the least.
+    unsure: Vec<u32>,
+    /// Where in `looks` the pieces that look at each pixel begin.
+    start: Vec<u32>,
+    looks: Vec<u32>,
+}
+
+/// What drawing a layer needs room for.
+#[derive(Default)]
+pub(super) struct Tools {
+    projected: Projected,
+    candidates: Candidates,
+    room: Room,
+}
+
+/// A scene in the picture of one camera.
+pub(super) struct Backdrop {
+    camera: [u64; 17],
+    lists: Vec<Known>,
+    leaves: Vec<Leaf>,
+    movers: Vec<Mover>,
+    still: Option<Still>,
+    depth: Vec<f32>,
+    extent: f64,
+    /// Drawings since most of it moved.
+    waited: u32,
+    at: Arc<()>,
+    count: usize,
+    // Kept for their memory.
+    scratch: Layer,
+    rows: Vec<f32>,
+    pixels: Vec<u32>,
+    areas: Vec<Area>,
+}
+
+/// A thread's scenes, the one drawn last in front.
+#[derive(Default)]
+struct Backdrops {
+    scenes: Vec<Backdrop>,
+    tools: Tools,
+}
+
+/// Pictures that a thread keeps a scene of: several cameras, or several sizes.
+const PICTURES: usize = 4;
+
+thread_local! {
+    static BACKDROPS: RefCell<Backdrops> = RefCell::default();
+}
+
+/// The contours of a solid most of which stands still, and with them what has changed; `None` for one that is better drawn in another way.
+pub(super) fn contours(solid: &Solid, camera: &Camera) -> Option<Contours> {
+    with_scene(solid, camera, |scene, tools| scene.draw(solid, camera, tools).map(|_| scene.contours(camera)))
+}
+
+/// As [`contours`], only what has changed.
+pub(super) fn change(solid: &Solid, camera: &Camera) -> Option<Change> {
+    with_scene(solid, camera, |scene, tools| scene.draw(solid, camera, tools))
+}
+
+/// Works on the scene in a camera's picture.
+fn with_scene<T>(
+    solid: &Solid,
+    camera: &Camera,
+    work: impl FnOnce(&mut Backdrop, &mut Tools) -> Option<T>,
+) -> Option<T> {
+    if solid.mesh_count() < FEWEST {
+        return None;
+    }
+    BACKDROPS.with(|all| {
+        let mut all = all.try_borrow_mut().ok()?;
+        let Backdrops { scenes, tools } = &mut *all;
+        let eye = camera_bits(camera);
+        match scenes.iter().position(|scene| scene.camera == eye) {
+            Some(at) => scenes[..=at].rotate_right(1),
+            None => {
+                scenes.truncate(PICTURES - 1);
+                scenes.insert(0, Backdrop::new(camera));
+            }
+        }
+        work(scenes.first_mut()?, tools)
+    })
+}
+
+impl Backdrop {
+    /// Nothing drawn yet.
+    pub fn new(camera: &Camera) -> Backdrop {
+        Backdrop {
+            camera: camera_bits(camera),
+            lists: Vec::new(),
+            leaves: Vec::new(),
+            movers: Vec::new(),
+            still: None,
+            depth: Vec::new(),
+            extent: 0.0,
+            waited: 0,
+            at: Arc::default(),
+            count: 0,
+            scratch: Layer::default(),
+            rows: Vec::new(),
+            pixels: Vec::new(),
+            areas: Vec::new(),
+        }
+    }
+
+    /// Brings it up to date; `None` for solids that are better drawn in another way: of few meshes, or most of which have moved.
+    pub fn draw(&mut self, solid: &Solid, camera: &Camera, tools: &mut Tools) -> Option<Change> {
+        let count = solid.mesh_count();
+        let changed = self.find_changed(solid);
+        if 2 * changed.len() > count {
+            self.forget();
+            return None;
+        }
+        for (leaf, _) in &changed {
+            if !std::mem::replace(&mut self.leaves[*leaf].moves, true) {
+                let at = self.movers.partition_point(|m| m.leaf < *leaf);
+                self.movers.insert(at, Mover { leaf: *leaf, ..Mover::default() });
+                self.still = None;
+            }
+        }
+        if 2 * self.movers.len() > count {
+            self.still = None;
+            self.waited += 1;
+            if self.waited > PATIENCE {
+                self.forget();
+            }
+            return None;
+        }
+        self.waited = 0;
+        let known = self.still.is_some();
+        if !known {
+            self.build(solid, camera, tools)?;
+        }
+        self.areas.clear();
+        for (leaf, instance) in &changed {
+            let Some(mover) = self.movers.iter_mut().find(|m| m.leaf == *leaf) else { continue };
+            self.areas.push(mover.now.layer.area);
+            mover.move_to(instance, camera, tools);
+            self.areas.push(mover.now.layer.area);
+        }
+        let still = self.still.as_mut()?;
+        let range = self.movers.iter().fold(still.range, |range, m| range.and(&m.now.layer.range));
+        let (extent, before) = (range.extent(), self.extent);
+        self.extent = extent;
+        if known && still.holds(extent) {
+            let moved = |m: &Mover| changed.iter().any(|(leaf, _)| *leaf == m.leaf);
+            return self.step(camera, before.to_bits() == extent.to_bits(), moved);
+        }
+        still.settle(camera, extent, known)?;
+        self.begin(camera)
+    }
+
+    /// The contours that it shows.
+    pub fn contours(&self, camera: &Camera) -> Contours {
+        let mut out = Contours::with_room(camera, self.count);
+        let mut movers = self.movers.iter().peekable();
+        for live in self.still.iter().flat_map(|still| &still.live).filter(|live| live.shown) {
+            while let Some(mover) = movers.next_if(|m| m.leaf < live.leaf) {
+                out.append(&mover.seen);
+            }
+            out.push(&live.piece);
+        }
+        movers.for_each(|mover| out.append(&mover.seen));
+        out
+    }
+
+    /// Forgets what has moved.
+    fn forget(&mut self) {
+        self.movers.clear();
+        self.leaves.iter_mut().for_each(|leaf| leaf.moves = false);
+        (self.still, self.waited) = (None, 0);
+    }
+
+    /// The meshes that are not as they were drawn last; what is known of the solid becomes that of this one.
+    fn find_changed<'a>(&mut self, solid: &'a Solid) -> Vec<(usize, &'a Instance)> {
+        let (mut changed, mut first, mut lists) = (Vec::new(), 0, 0);
+        for meshes in solid.lists() {
+            let known = self.lists.get(lists).filter(|known| known.first == first && meshes.is(&known.list));
+            if let Some(known) = known {
+                first += known.count;
+                lists += 1;
+                continue;
+            }
+            let now = Known { list: meshes.mark(), first, count: meshes.len() };
+            for (leaf, instance) in (first..).zip(meshes.iter()) {
+                let affine = affine_bits(&instance.affine);
+                match self.leaves.get_mut(leaf) {
+                    Some(l) if l.affine == affine && std::ptr::eq(l.mesh.as_ptr(), Arc::as_ptr(&instance.mesh)) => {}
+                    Some(l) => {
+                        (l.mesh, l.affine) = (Arc::downgrade(&instance.mesh), affine);
+                        changed.push((leaf, instance));
+                    }
+                    None => {
+                        self.leaves.push(Leaf { mesh: Arc::downgrade(&instance.mesh), affine, moves: false });
+                        self.still = None;
+                        changed.push((leaf, instance));
+                    }
+                }
+            }
+            first += now.count;
+            match self.lists.get_mut(lists) {
+                Some(known) => *known = now,
+                None => self.lists.push(now),
+            }
+            lists += 1;
+        }
+        self.lists.truncate(lists);
+        if first < self.leaves.len() {
+            self.leaves.truncate(first);
+            self.movers.retain(|m| m.leaf < first);
+            self.still = None;
+        }
+        changed
+    }
+
+    /// Draws all meshes, those that stand still and the others.
+    fn build(&mut self, solid: &Solid, camera: &Camera, tools: &mut Tools) -> Option<()> {
+        let mut still = Still { depth: vec![f32::INFINITY; camera.pixels()], width: 0.02, ..Still::default() };
+        let (whole, width) = (Area::whole(camera), camera.width as usize);
+        let mut movers = self.movers.iter_mut().peekable();
+        for (leaf, instance) in solid.lists().flat_map(|list| list.iter()).enumerate() {
+            if let Some(mover) = movers.next_if(|m| m.leaf == leaf) {
+                mover.move_to(instance, camera, tools);
+                continue;
+            }
+            let layer = &mut self.scratch;
+            layer.draw(instance, camera, (&mut tools.projected, &mut tools.candidates), &mut tools.room);
+            layer.show(&mut still.depth, width, &whole);
+            still.range = still.range.and(&layer.range);
+            still.pieces.extend(layer.pieces.iter().map(|piece| (*piece, leaf)));
+            if still.pieces.len() > MOST_PIECES {
+                return None;
+            }
+        }
+        self.still = Some(still);
+        Some(())
+    }
+
+    /// Composes the whole picture and looks at everything.
+    fn begin(&mut self, camera: &Camera) -> Option<Change> {
+        let Backdrop { still, movers, depth, extent, .. } = self;
+        let still = still.as_mut()?;
+        depth.clone_from(&still.depth);
+        movers.iter().for_each(|m| m.now.layer.show(depth, camera.width as usize, &Area::whole(camera)));
+        let depths = Depths::new(depth, camera.width, camera.height, *extent)?;
+        self.count = 0;
+        for live in &mut still.live {
+            live.shown = depths.visible(&live.piece);
+            self.count += usize::from(live.shown);
+        }
+        for mover in movers {
+            mover.look(&depths);
+            self.count += mover.seen.len();
+        }
+        self.at = Arc::default();
+        let none = || Contours::with_room(camera, 0);
+        Some(Change { from: Arc::default(), to: self.at.clone(), gone: none(), come: none(), count: self.count })
+    }
+
+    /// Composes the picture where some have moved, and looks again where they were and are.
+    fn step(&mut self, camera: &Camera, same_extent: bool, moved: impl Fn(&Mover) -> bool) -> Option<Change> {
+        let Backdrop { still, movers, depth, extent, rows, pixels, areas, .. } = self;
+        let (still, width) = (still.as_mut()?, camera.width as usize);
+        Area::join(areas);
+        pixels.clear();
+        for area in &*areas {
+            let span = |row: usize| row * width + area.left..row * width + area.right;
+            rows.clear();
+            for row in area.top..area.bottom {
+                let (Some(there), Some(still)) = (depth.get_mut(span(row)), still.depth.get(span(row))) else { continue };
+                rows.extend_from_slice(there);
+                there.copy_from_slice(still);
+            }
+            vectorised(
+                #[inline(always)]
+                || movers.iter().for_each(|m| m.now.layer.show(depth, width, area)),
+            );
+            let mut before = rows.iter();
+            for at in (area.top..area.bottom).flat_map(span) {
+                let (Some(now), Some(still), Some(before)) = (depth.get(at), still.depth.get(at), before.next()) else { break };
+                // Where there is a mover, what is seen may also change with the depth range.
+                if now != before || (!same_extent && now != still) {
+                    pixels.push(at as u32);
+                }
+            }
+        }
+        if !same_extent {
+            for mover in movers.iter().filter(|m| !moved(m)) {
+                let area = mover.now.layer.area;
+                let all = (area.top..area.bottom).flat_map(|row| row * width + area.left..row * width + area.right);
+                pixels.extend(all.filter(|at| depth.get(*at) != still.depth.get(*at)).map(|at| at as u32));
+            }
+        }
+        let depths = Depths::new(depth, camera.width, camera.height, *extent)?;
+        let [mut gone, mut come] = [0; 2].map(|_| Contours::with_room(camera, 256));
+        let mut look = |live: &mut Live| {
+            let shown = depths.visible(&live.piece);
+            if shown != live.shown {
+                live.shown = shown;
+                if shown { &mut come } else { &mut gone }.push(&live.piece);
+            }
+        };
+        let Still { live, unsure, start, looks, .. } = still;
+        let unsure = if same_extent { &[][..] } else { &unsure[..] };
+        for pixel in &*pixels {
+            let ends = [*pixel as usize, *pixel as usize + 1].map(|i| start.get(i).map_or(0, |s| *s as usize));
+            for i in looks.get(ends[0]..ends[1]).unwrap_or_default() {
+                live.get_mut(*i as usize).into_iter().for_each(&mut look);
+            }
+        }
+        for i in unsure {
+            live.get_mut(*i as usize).into_iter().for_each(&mut look);
+        }
+        for mover in movers {
+            let (area, moved) = (mover.now.layer.looks, moved(mover));
+            if moved || !same_extent || areas.iter().any(|dirty| dirty.meets(&area)) {
+                gone.append(&mover.seen);
+                mover.look(&depths);
+                come.append(&mover.seen);
+            }
+        }
+        self.count = self.count + come.len() - gone.len();
+        let from = self.at.clone();
+        if !(gone.is_empty() && come.is_empty()) {
+            self.at = Arc::default();
+        }
+        Some(Change { from, to: self.at.clone(), gone, come, count: self.count })
+    }
+}
+
+impl Mover {
+    /// Its layer is that of the instance from here on.
+    fn move_to(&mut self, instance: &Instance, camera: &Camera, tools: &mut Tools) {
+        let affine = affine_bits(&instance.affine);
+        let is_it = |own: &Own| own.affine == affine && std::ptr::eq(own.mesh.as_ptr(), Arc::as_ptr(&instance.mesh));
+        if is_it(&self.now) {
+            return;
+        }
+        std::mem::swap(&mut self.now, &mut self.before);
+        if !is_it(&self.now) {
+            (self.now.mesh, self.now.affine) = (Arc::downgrade(&instance.mesh), affine);
+            let Tools { projected, candidates, room } = tools;
+            self.now.layer.draw(instance, camera, (projected, candidates), room);
+        }
+    }
+
+    /// Tells which of its pieces are seen.
+    fn look(&mut self, depths: &Depths<'_>) {
+        self.seen.clear();
+        let Mover { now, seen, .. } = self;
+        now.layer.pieces.iter().filter(|piece| depths.visible(piece)).for_each(|piece| seen.push(piece));
+    }
+}
+
+impl Still {
+    /// Whether what is known of the pieces holds for a depth range.
+    fn holds(&self, extent: f64) -> bool {
+        let [least, most] = self.extents;
+        least <= extent && extent <= most
+    }
+
+    /// Sorts the pieces for depth ranges about this one; for more of them if it has been done before.
+    fn settle(&mut self, camera: &Camera, extent: f64, again: bool) -> Option<()> {
+        self.width = if again { (2.0 * self.width).min(0.5) } else { self.width };
+        self.extents = [extent * (1.0 - self.width), extent * (1.0 + self.width)];
+        let [least, most] = self.extents.map(|extent| Depths::new(&self.depth, camera.width, camera.height, extent));
+        let (least, most) = (least?, most?);
+        self.live.clear();
+        self.unsure.clear();
+        for (piece, leaf) in self.pieces.iter().filter(|(piece, _)| most.visible(piece)) {
+            if !least.visible(piece) {
+                self.unsure.push(self.live.len() as u32);
+            }
+            self.live.push(Live { piece: *piece, leaf: *leaf, shown: false });
+        }
+        // A counting sort by pixel.
+        self.start.clear();
+        self.start.resize(self.depth.len() + 2, 0);
+        let at = |live: &Live| [0, 1].map(|side| live.piece.pixel(side).map(|p| p as usize)).into_iter().flatten();
+        for pixel in self.live.iter().flat_map(at) {
+            self.start[pixel + 2] += 1;
+        }
+        let mut sum = 0;
+        for start in &mut self.start {
+            sum += *start;
+            *start = sum;
+        }
+        self.looks.clear();
+        self.looks.resize(sum as usize, 0);
+        for (i, live) in self.live.iter().enumerate() {
+            for pixel in at(live) {
+                let place = &mut self.start[pixel + 1];
+                self.looks[*place as usize] = i as u32;
+                *place += 1;
+            }
+        }
+        Some(())
+    }
+}
