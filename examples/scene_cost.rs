@@ -1,10 +1,10 @@
 //! What one transition costs as a scene grows of which one object is uncertain: a vase whose pose drifts among boxes, balls and lathes that stand still.
 //!
-//!     cargo run --release --example scene_cost -- [N…] [nested|flat] [front|hidden] [contour|chamfer|both] [count=TRANSITIONS]
+//!     cargo run --release --example scene_cost -- [N…] [nested|flat] [front|hidden] [contour|chamfer|both] [count=TRANSITIONS] [scale=S]
 //!
 //! The picture is that of the program at the truth, rendered; N counts the vase. `nested`: what stands still is a group of its own; `flat`: all objects
-//! are members of one group. `front`: the vase stands before the others; `hidden`: among them, so that half of them may stand before it. Prints processor times of
-//! the one thread. For instructions, run it twice under callgrind with different `count` and take the difference.
+//! are members of one group. `front`: the vase stands before the others; `hidden`: among them, so that half of them may stand before it. Without a scale the kernel
+//! learns it in a warm-up. Prints processor times of the one thread. For instructions, run it twice under callgrind with different `count` and take the difference.
 
 mod clock;
 
@@ -23,8 +23,8 @@ use std::fmt::Write;
 /// The longer side of the picture.
 const SIZE: u32 = 128;
 
-/// Transitions before the clock starts.
-const WARM: u64 = 300;
+/// Transitions of the warm-up, in which the kernel learns its scale.
+const WARM: u64 = 3000;
 
 /// What is asked for.
 struct Wanted {
@@ -32,19 +32,21 @@ struct Wanted {
     front: bool,
     observe: String,
     count: u64,
+    scale: Option<f64>,
 }
 
 fn main() -> Result<(), Box<dyn Error>> {
     let mut sizes: Vec<usize> = Vec::new();
-    let mut wanted = Wanted { flat: false, front: true, observe: "contour".into(), count: 3000 };
+    let mut wanted = Wanted { flat: false, front: true, observe: "contour".into(), count: 3000, scale: None };
     for a in std::env::args().skip(1) {
         match a.as_str() {
             "nested" | "flat" => wanted.flat = a == "flat",
             "front" | "hidden" => wanted.front = a == "front",
             "contour" | "chamfer" | "both" => wanted.observe = a,
-            _ => match a.strip_prefix("count=") {
-                Some(count) => wanted.count = count.parse()?,
-                None => sizes.push(a.parse()?),
+            _ => match a.split_once('=') {
+                Some(("count", count)) => wanted.count = count.parse()?,
+                Some(("scale", scale)) => wanted.scale = Some(scale.parse()?),
+                _ => sizes.push(a.parse()?),
             },
         }
     }
@@ -56,10 +58,10 @@ fn main() -> Result<(), Box<dyn Error>> {
         let (model, mut trace) = scene(n, &wanted)?;
         let pieces = view(&mut trace)?.0.contours(SIZE).len();
         let scope = Scope { selector: Selector::Tag { name: "pose".into(), value: None }, pick: Pick::All };
-        let mut kernel = Drift::new(scope, Some(0.02));
-        run(&mut kernel, &mut trace, 0..WARM)?;
+        let mut kernel = Drift::new(scope, wanted.scale);
+        run(&mut kernel, &mut trace, 0..WARM, true)?;
         let begun = processor_seconds();
-        let moved = run(&mut kernel, &mut trace, WARM..WARM + wanted.count)?;
+        let moved = run(&mut kernel, &mut trace, WARM..WARM + wanted.count, false)?;
         let each = (processor_seconds() - begun) / wanted.count as f64 * 1e6;
         let times = each / *alone.get_or_insert(each);
         println!("{n:>5} objects, {pieces:>5} pieces: {each:>8.1} us a transition, {times:>6.2} times, {moved} moved");
@@ -69,10 +71,15 @@ fn main() -> Result<(), Box<dyn Error>> {
 }
 
 /// Steps of a kernel; how many were accepted.
-fn run(kernel: &mut dyn Kernel, trace: &mut Trace, steps: std::ops::Range<u64>) -> Result<u64, Box<dyn Error>> {
+fn run(
+    kernel: &mut dyn Kernel,
+    trace: &mut Trace,
+    steps: std::ops::Range<u64>,
+    adapting: bool,
+) -> Result<u64, Box<dyn Error>> {
     let mut moved = 0;
     for step in steps {
-        let outcome = kernel.step(trace, &At::new(1, 0, step)).map_err(|e| e.to_string())?;
+        let outcome = kernel.step(trace, &At { adapting, ..At::new(1, 0, step) }).map_err(|e| e.to_string())?;
         moved += u64::from(outcome.accepted);
     }
     Ok(moved)

@@ -5,7 +5,6 @@
 //! Invariant: as for [`super::layers`], contours are those drawn at once, bit for bit. That rests on looks being monotone: what another mesh
 //! or a smaller depth range hides stays hidden with both, in `f64` too.
 
-use super::Camera;
 use super::candidates::Candidates;
 use super::contours::Contours;
 use super::layers::{Layer, affine_bits, camera_bits};
@@ -14,6 +13,7 @@ use super::raster::Area;
 use super::simd::vectorised;
 use super::trace::Room;
 use super::visibility::{Depths, Piece};
+use super::{Camera, work};
 use crate::geom::{Instance, Mesh, MeshesMark, Solid};
 use std::cell::RefCell;
 use std::sync::{Arc, Weak};
@@ -23,6 +23,9 @@ const FEWEST: usize = 3;
 
 /// Memory of a backdrop, in pieces; a scene of more is drawn at once.
 const MOST_PIECES: usize = 1 << 19;
+
+/// Half the width of the depth ranges that a backdrop is first made ready for, relatively.
+const FIRST_WIDTH: f64 = 0.005;
 
 /// How many drawings later a scene of which most moved is looked at again.
 const PATIENCE: u32 = 1024;
@@ -62,6 +65,8 @@ struct Own {
     mesh: Weak<Mesh>,
     affine: [u64; 12],
     layer: Layer,
+    /// Whether it was left undrawn, since the backdrop hides all of it.
+    hidden: bool,
 }
 
 /// A mesh that has moved: its layer where it is, and where it was before.
@@ -95,6 +100,8 @@ struct Still {
     live: Vec<Live>,
     /// Of those, the ones it hides at the least.
     unsure: Vec<u32>,
+    /// By pixel: the least depth that leaves any of those free that look there, whatever the depth range.
+    nearest: Vec<f64>,
     /// Where in `looks` the pieces that look at each pixel begin.
     start: Vec<u32>,
     looks: Vec<u32>,
@@ -229,9 +236,10 @@ impl Backdrop {
         for (leaf, instance) in &changed {
             let Some(mover) = self.movers.iter_mut().find(|m| m.leaf == *leaf) else { continue };
             self.areas.push(mover.now.layer.area);
-            mover.move_to(instance, camera, tools);
+            mover.move_to(instance, camera, tools, self.still.as_ref().filter(|_| known));
             self.areas.push(mover.now.layer.area);
         }
+        work::count(|work| work.kept += (count - changed.len()) as u64);
         let still = self.still.as_mut()?;
         let range = self.movers.iter().fold(still.range, |range, m| range.and(&m.now.layer.range));
         let (extent, before) = (range.extent(), self.extent);
@@ -241,6 +249,15 @@ impl Backdrop {
             return self.step(camera, before.to_bits() == extent.to_bits(), moved);
         }
         still.settle(camera, extent, known)?;
+        if self.movers.iter().any(|m| m.now.hidden) {
+            // What was hidden need not be so with another depth range.
+            let mut movers = self.movers.iter_mut().peekable();
+            for (leaf, instance) in solid.lists().flat_map(|list| list.iter()).enumerate() {
+                if let Some(mover) = movers.next_if(|m| m.leaf == leaf) {
+                    mover.move_to(instance, camera, tools, None);
+                }
+            }
+        }
         self.begin(camera)
     }
 
@@ -309,16 +326,17 @@ impl Backdrop {
 
     /// Draws all meshes, those that stand still and the others.
     fn build(&mut self, solid: &Solid, camera: &Camera, tools: &mut Tools) -> Option<()> {
-        let mut still = Still { depth: vec![f32::INFINITY; camera.pixels()], width: 0.02, ..Still::default() };
+        let mut still = Still { depth: vec![f32::INFINITY; camera.pixels()], width: FIRST_WIDTH, ..Still::default() };
         let (whole, width) = (Area::whole(camera), camera.width as usize);
         let mut movers = self.movers.iter_mut().peekable();
         for (leaf, instance) in solid.lists().flat_map(|list| list.iter()).enumerate() {
             if let Some(mover) = movers.next_if(|m| m.leaf == leaf) {
-                mover.move_to(instance, camera, tools);
+                mover.move_to(instance, camera, tools, None);
                 continue;
             }
             let layer = &mut self.scratch;
-            layer.draw(instance, camera, (&mut tools.projected, &mut tools.candidates), &mut tools.room);
+            let Tools { projected, candidates, room } = tools;
+            layer.draw(instance, camera, (projected, candidates), room, |_, _| false);
             layer.show(&mut still.depth, width, &whole);
             still.range = still.range.and(&layer.range);
             still.pieces.extend(layer.pieces.iter().map(|piece| (*piece, leaf)));
@@ -356,6 +374,13 @@ impl Backdrop {
         let Backdrop { still, movers, depth, extent, rows, pixels, areas, .. } = self;
         let (still, width) = (still.as_mut()?, camera.width as usize);
         Area::join(areas);
+        work::count(|work| {
+            work.partial += 1;
+            work.pixels += areas.iter().map(Area::pixels).sum::<usize>() as u64;
+        });
+        // Where something is so near that all looks of the backdrop end at it, a change means nothing.
+        let nearest = &still.nearest;
+        let still_hides = |at: usize, depth: f32| nearest.get(at).is_none_or(|nearest| f64::from(depth) < *nearest);
         pixels.clear();
         for area in &*areas {
             let span = |row: usize| row * width + area.left..row * width + area.right;
@@ -373,7 +398,8 @@ impl Backdrop {
             for at in (area.top..area.bottom).flat_map(span) {
                 let (Some(now), Some(still), Some(before)) = (depth.get(at), still.depth.get(at), before.next()) else { break };
                 // Where there is a mover, what is seen may also change with the depth range.
-                if now != before || (!same_extent && now != still) {
+                let hidden = still_hides(at, *now) && still_hides(at, *before);
+                if !hidden && (now != before || (!same_extent && now != still)) {
                     pixels.push(at as u32);
                 }
             }
@@ -382,7 +408,11 @@ impl Backdrop {
             for mover in movers.iter().filter(|m| !moved(m)) {
                 let area = mover.now.layer.area;
                 let all = (area.top..area.bottom).flat_map(|row| row * width + area.left..row * width + area.right);
-                pixels.extend(all.filter(|at| depth.get(*at) != still.depth.get(*at)).map(|at| at as u32));
+                let open = |at: &usize| match (depth.get(*at), still.depth.get(*at)) {
+                    (Some(now), Some(still)) => now != still && !still_hides(*at, *now),
+                    _ => false,
+                };
+                pixels.extend(all.filter(open).map(|at| at as u32));
             }
         }
         let depths = Depths::new(depth, camera.width, camera.height, *extent)?;
@@ -423,10 +453,12 @@ impl Backdrop {
 }
 
 impl Mover {
-    /// Its layer is that of the instance from here on.
-    fn move_to(&mut self, instance: &Instance, camera: &Camera, tools: &mut Tools) {
+    /// Its layer is that of the instance from here on; nothing is drawn of one that this backdrop hides.
+    fn move_to(&mut self, instance: &Instance, camera: &Camera, tools: &mut Tools, behind: Option<&Still>) {
         let affine = affine_bits(&instance.affine);
-        let is_it = |own: &Own| own.affine == affine && std::ptr::eq(own.mesh.as_ptr(), Arc::as_ptr(&instance.mesh));
+        let is_it = |own: &Own| {
+            !own.hidden && own.affine == affine && std::ptr::eq(own.mesh.as_ptr(), Arc::as_ptr(&instance.mesh))
+        };
         if is_it(&self.now) {
             return;
         }
@@ -434,7 +466,8 @@ impl Mover {
         if !is_it(&self.now) {
             (self.now.mesh, self.now.affine) = (Arc::downgrade(&instance.mesh), affine);
             let Tools { projected, candidates, room } = tools;
-            self.now.layer.draw(instance, camera, (projected, candidates), room);
+            let hides = |range: &DepthRange, area: &Area| behind.is_some_and(|still| still.hides(range, area, camera));
+            self.now.hidden = !self.now.layer.draw(instance, camera, (projected, candidates), room, hides);
         }
     }
 
@@ -447,6 +480,18 @@ impl Mover {
 }
 
 impl Still {
+    /// Whether it hides all of a mesh with this depth range that covers pixels of an area only, contours included.
+    fn hides(&self, range: &DepthRange, area: &Area, camera: &Camera) -> bool {
+        let (limit, width) = (Depths::hiding(self.extents[1], range), camera.width as usize);
+        // Pieces may lie, and look, a little beside the area.
+        const REACH: usize = 4;
+        let (left, right) = (area.left.saturating_sub(REACH), (area.right + REACH).min(width));
+        let rows = area.top.saturating_sub(REACH)..(area.bottom + REACH).min(camera.height as usize);
+        let near = |d: &f32| f64::from(*d) < limit;
+        area.pixels() > 0
+            && rows.map(|row| row * width + left..row * width + right).all(|row| self.depth.get(row).is_some_and(|row| row.iter().all(near)))
+    }
+
     /// Whether what is known of the pieces holds for a depth range.
     fn holds(&self, extent: f64) -> bool {
         let [least, most] = self.extents;
@@ -459,6 +504,8 @@ impl Still {
         self.extents = [extent * (1.0 - self.width), extent * (1.0 + self.width)];
         let [least, most] = self.extents.map(|extent| Depths::new(&self.depth, camera.width, camera.height, extent));
         let (least, most) = (least?, most?);
+        self.nearest.clear();
+        self.nearest.resize(self.depth.len(), f64::INFINITY);
         self.live.clear();
         self.unsure.clear();
         for (piece, leaf) in self.pieces.iter().filter(|(piece, _)| most.visible(piece)) {
@@ -466,6 +513,11 @@ impl Still {
                 self.unsure.push(self.live.len() as u32);
             }
             self.live.push(Live { piece: *piece, leaf: *leaf, shown: false });
+            for (pixel, depth) in most.looks(piece) {
+                if let Some(nearest) = self.nearest.get_mut(pixel) {
+                    *nearest = nearest.min(depth);
+                }
+            }
         }
         // A counting sort by pixel.
         self.start.clear();
@@ -491,3 +543,7 @@ impl Still {
         Some(())
     }
 }
+
+#[cfg(test)]
+#[path = "backdrop_tests.rs"]
+mod tests;

@@ -14,7 +14,7 @@ use super::raster::{Area, draw_mesh};
 use super::simd::vectorised;
 use super::trace::{Room, trace_mesh};
 use super::visibility::{BESIDE, Depths, Piece};
-use super::{Camera, Projection};
+use super::{Camera, Projection, work};
 use crate::geom::{Affine, Instance, Mesh, Solid};
 use std::cell::RefCell;
 use std::sync::{Arc, Weak};
@@ -158,6 +158,7 @@ impl Layers {
             let before = self.shown.get(i).copied();
             let kept = before.map(|shown| shown.at).filter(|&at| self.slots.get(at).is_some_and(is_it));
             let found = kept.or_else(|| self.slots.iter().position(is_it));
+            work::count(|work| work.kept += u64::from(found.is_some()));
             let at = found.unwrap_or_else(|| self.draw(instance, camera, affine, eye));
             let Some(slot) = self.slots.get_mut(at) else { continue };
             slot.used = self.clock;
@@ -174,6 +175,10 @@ impl Layers {
         let gone = self.shown.drain(solid.instances().len().min(self.shown.len())..);
         self.dirty.extend(gone.map(|shown| shown.area));
         Area::join(&mut self.dirty);
+        work::count(|work| {
+            work.partial += 1;
+            work.pixels += self.dirty.iter().map(Area::pixels).sum::<usize>() as u64;
+        });
         let Layers { dirty, depth, shown, slots, .. } = self;
         for area in dirty {
             for row in area.top..area.bottom {
@@ -206,7 +211,8 @@ impl Layers {
         self.bytes -= slot.layer.bytes();
         (slot.mesh, slot.affine, slot.camera) = (Arc::downgrade(&instance.mesh), affine, eye);
         (slot.made, slot.seen_at) = ((self.clock, at), 0);
-        slot.layer.draw(instance, camera, (&mut self.projected, &mut self.candidates), &mut self.room);
+        let tools = (&mut self.projected, &mut self.candidates);
+        slot.layer.draw(instance, camera, tools, &mut self.room, |_, _| false);
         self.bytes += slot.layer.bytes();
         at
     }
@@ -222,25 +228,39 @@ impl Layers {
 }
 
 impl Layer {
-    /// Draws a mesh alone.
+    /// Draws a mesh alone, unless it is told hidden by its depth range and the pixels it reaches; whether it was drawn.
     pub fn draw(
         &mut self,
         instance: &Instance,
         camera: &Camera,
         (projected, candidates): (&mut Projected, &mut Candidates),
         room: &mut Room,
-    ) {
+        hidden: impl FnOnce(&DepthRange, &Area) -> bool,
+    ) -> bool {
         let placement = Placement::new(camera, &instance.affine);
         projected.clear();
         self.range = projected.add(&instance.mesh, &placement, &Lens::new(camera));
         let vertices = projected.mesh(0);
         self.area = Area::around(&vertices, camera);
+        self.pieces.clear();
+        self.seen.clear();
+        self.depth.clear();
+        self.looks = Area::default();
+        if vertices.outside(camera) {
+            work::count(|work| work.outside += 1);
+            return true;
+        }
+        if hidden(&self.range, &self.area) {
+            work::count(|work| work.hidden += 1);
+            self.area = Area::default();
+            return false;
+        }
+        work::drawn(&instance.mesh);
         draw_mesh(&instance.mesh, &placement, camera, &vertices, candidates, &self.area, &mut self.depth);
         to_depth(camera, &mut self.depth);
-        self.pieces.clear();
         trace_mesh(&instance.mesh, &placement, camera, &vertices, room, |piece, _| self.pieces.push(piece));
         self.looks = Area::looked_at(&self.pieces, camera);
-        self.seen.clear();
+        true
     }
 
     /// Puts what is nearer than the picture into it, in some area.

@@ -31,6 +31,7 @@ mod triangle;
 mod view;
 mod visibility;
 mod wander;
+mod work;
 
 #[cfg(test)]
 mod extremes_tests;
@@ -46,3 +47,4 @@ pub use contours::Contours;
 pub use frame::{Channels, Frame};
 pub use shade::shade;
 pub use view::View;
+pub use work::{Work, work};
