@@ -122,7 +122,8 @@ fn program(n: usize, wanted: &Wanted) -> String {
         let turn = [between(-1.0, 1.0), between(-1.0, 1.0), between(-1.0, 1.0)];
         let _ = writeln!(things, "  {{ kind: {}, at: [{x}, {y}, {z}], turn: {turn:?}, size: {size} }},", i % 3);
     }
-    let members = if wanted.flat { "append(map(thing, things), vase)" } else { "[scene.group(map(thing, things)), vase]" };
+    let members =
+        if wanted.flat { "append(map(thing, things), vase)" } else { "[scene.group(map(thing, things)), vase]" };
     let group = if n == 1 { "[vase]" } else { members };
     let _ = writeln!(
         text,

@@ -418,7 +418,8 @@ infer { warmup 20 { drift(one($place)); } repeat 60 { drift(one($place)); block(
     let job = ["run", "balls.pcad", "--observe", "disc.png", "--chains", "1", "--explain", "--out", "a"];
     let done = f.succeeds(&job);
     let lines = done.out.lines().skip_while(|l| !l.starts_with("modelled"));
-    let said: Vec<&str> = lines.take_while(|l| !["warning:", "note:", "seed "].iter().any(|s| l.starts_with(s))).collect();
+    let said: Vec<&str> =
+        lines.take_while(|l| !["warning:", "note:", "seed "].iter().any(|s| l.starts_with(s))).collect();
     snapshot("explained", said.join("\n").trim_end());
     let json: serde_json::Value = serde_json::from_str(&f.read("a/explained.json")).unwrap();
     let radius = json["choices"].as_array().unwrap().iter().find(|c| c["address"] == "@radius").unwrap();

@@ -25,9 +25,8 @@ observe scene.chamfer(view, sigma = 1, symmetric = true, size = 48) = photo as d
 
 fn model(text: &str, map: ContourMap) -> Model {
     let image = Value::object(ImageValue::contours(map, None));
-    let program = Program::parse(text).and_then(|p| {
-        p.observe("photo", image).camera(Camera::default_for(SIZE, SIZE)).compile()
-    });
+    let program =
+        Program::parse(text).and_then(|p| p.observe("photo", image).camera(Camera::default_for(SIZE, SIZE)).compile());
     program.unwrap_or_else(|e| panic!("{e}"))
 }
 
@@ -64,7 +63,8 @@ fn the_second_part_comes_and_goes_as_its_posterior_says() {
     for kernels in ["mh(@two); drift(one($continuous));", "gibbs(@two); drift(one($continuous));", "mh(one(@**));"] {
         let plan = format!("{MODEL}infer {{ warmup 500 {{ {kernels} }} repeat 12000 {{ {kernels} collect two; }} }}");
         let posterior = model(&plan, map.clone()).run(&RunOptions::default(), 2, 2).unwrap();
-        let draws: Vec<f64> = posterior.scalars().into_iter().filter(|(n, _)| n == "two").flat_map(|(_, v)| v).collect();
+        let draws: Vec<f64> =
+            posterior.scalars().into_iter().filter(|(n, _)| n == "two").flat_map(|(_, v)| v).collect();
         assert_mean(kernels, &draws, expected, 0.12);
     }
 }

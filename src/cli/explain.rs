@@ -110,7 +110,13 @@ fn without_keys(address: &str) -> String {
 }
 
 fn count(n: u64, what: &str) -> String {
-    let s = if n == 1 { "" } else if what.ends_with("sh") { "es" } else { "s" };
+    let s = if n == 1 {
+        ""
+    } else if what.ends_with("sh") {
+        "es"
+    } else {
+        "s"
+    };
     format!("{n} {what}{s}")
 }
 
@@ -133,7 +139,8 @@ impl Explanation {
         let mut by: BTreeMap<&[String], Vec<&str>> = BTreeMap::new();
         self.groups.iter().for_each(|g| by.entry(&g.kernels).or_default().push(&g.name));
         for (kernels, names) in by {
-            let kernels = if kernels.is_empty() { "no kernel: the plan names none of them".into() } else { kernels.join(", ") };
+            let kernels =
+                if kernels.is_empty() { "no kernel: the plan names none of them".into() } else { kernels.join(", ") };
             text += &wrapped(&format!("{} by {kernels}", names.join(", ")));
         }
         text += "\nredrawn, by one proposal of\n";
@@ -142,7 +149,11 @@ impl Explanation {
         }
         text += "\nskipped\n";
         let skipped = self.skipped();
-        text += &if skipped.is_empty() { "  nothing\n".into() } else { skipped.iter().map(|s| wrapped(s)).collect::<String>() };
+        text += &if skipped.is_empty() {
+            "  nothing\n".into()
+        } else {
+            skipped.iter().map(|s| wrapped(s)).collect::<String>()
+        };
         text
     }
 
@@ -152,7 +163,8 @@ impl Explanation {
             format!("{place} `{text}`: not drawn, since nothing that is observed asks for it in this state")
         };
         let mut all: Vec<String> = self.absent.iter().map(absent).collect();
-        let most = |of: fn(&Work) -> u64| self.groups.iter().filter_map(|g| g.drawn.as_ref().map(of)).max().unwrap_or(0);
+        let most =
+            |of: fn(&Work) -> u64| self.groups.iter().filter_map(|g| g.drawn.as_ref().map(of)).max().unwrap_or(0);
         let [closed, outside, hidden] = [most(|w| w.closed), most(|w| w.outside), most(|w| w.hidden)];
         if closed > 0 {
             all.push("backs of closed bodies: their fronts hide them".into());

@@ -6,7 +6,7 @@ use super::selection::{selector, target};
 use crate::lang::code::Code;
 use crate::platform::clock::Instant;
 use crate::syntax::ast::{Expr, ExprKind, KStmt, KStmtKind};
-use crate::syntax::format::print_expr;
+use crate::syntax::print_expr;
 use crate::trace::{Draws, Selector, Trace};
 use std::sync::Arc;
 
@@ -22,15 +22,8 @@ pub struct Selecting {
 /// The kernels of a plan, those of warm-up too, each once, in the order of the plan.
 pub fn selecting(code: &Arc<Code>, plan: &[KStmt], trace: &mut Trace) -> Vec<Selecting> {
     let mut found = Vec::new();
-    let env = Scope {
-        code,
-        trace,
-        variables: &[],
-        draws: Draws::default(),
-        started: Instant::now(),
-        steps: 0,
-        moved: None,
-    };
+    let env =
+        Scope { code, trace, variables: &[], draws: Draws::default(), started: Instant::now(), steps: 0, moved: None };
     Reader { code, env, found: &mut found, within: Vec::new() }.statements(plan);
     found
 }
@@ -83,7 +76,8 @@ impl Reader<'_, '_> {
         // Kernels without a selection move everything; those that hold others, what these do.
         let mut selected = false;
         for arg in args {
-            let inside = call(&arg.value).is_some_and(|(inner, args)| !matches!(inner, "one" | "each") && args.iter().any(|a| target(&a.value)));
+            let inside = call(&arg.value)
+                .is_some_and(|(inner, args)| !matches!(inner, "one" | "each") && args.iter().any(|a| target(&a.value)));
             if inside {
                 selected = true;
                 self.kernel(&arg.value);

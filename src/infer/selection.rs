@@ -27,7 +27,8 @@ pub(super) fn target(e: &Expr) -> bool {
     match &e.kind {
         ExprKind::Address(_) | ExprKind::TagSel { .. } => true,
         ExprKind::Binary { left, .. } => target(left),
-        _ => super::plan::call(e).is_some_and(|(name, args)| pick(name).is_some() && args.first().is_some_and(|a| target(&a.value))),
+        _ => super::plan::call(e)
+            .is_some_and(|(name, args)| pick(name).is_some() && args.first().is_some_and(|a| target(&a.value))),
     }
 }
 

@@ -30,17 +30,19 @@ const FIRST_WIDTH: f64 = 0.005;
 /// How many drawings later a scene of which most moved is looked at again.
 const PATIENCE: u32 = 1024;
 
-/// What a drawing's contours have more and less than those of the drawing before, by the same thread in the same picture.
+/// A drawing's contours: those of what moves, and what the rest have more and less than in the drawing before, by the same thread in the same picture.
 #[derive(Debug)]
 pub struct Change {
     /// Stands for the contours before; another one, that nobody has, where everything came.
     pub from: Arc<()>,
     /// Stands for the contours now.
     pub to: Arc<()>,
-    /// Pieces that are no longer seen.
+    /// Pieces of what stands still that are no longer seen.
     pub gone: Contours,
-    /// Pieces that were not seen before.
+    /// Pieces of what stands still that were not seen before.
     pub come: Contours,
+    /// All pieces that are seen of what moves.
+    pub moving: Contours,
     /// How many pieces are seen now.
     pub count: usize,
 }
@@ -127,6 +129,8 @@ pub(super) struct Backdrop {
     /// Drawings since most of it moved.
     waited: u32,
     at: Arc<()>,
+    /// How many pieces are seen of what stands still, and of all.
+    shown: usize,
     count: usize,
     // Kept for their memory.
     scratch: Layer,
@@ -196,6 +200,7 @@ impl Backdrop {
             extent: 0.0,
             waited: 0,
             at: Arc::default(),
+            shown: 0,
             count: 0,
             scratch: Layer::default(),
             rows: Vec::new(),
@@ -355,22 +360,28 @@ impl Backdrop {
         depth.clone_from(&still.depth);
         movers.iter().for_each(|m| m.now.layer.show(depth, camera.width as usize, &Area::whole(camera)));
         let depths = Depths::new(depth, camera.width, camera.height, *extent)?;
-        self.count = 0;
+        self.shown = 0;
         for live in &mut still.live {
             live.shown = depths.visible(&live.piece);
-            self.count += usize::from(live.shown);
+            self.shown += usize::from(live.shown);
         }
-        for mover in movers {
-            mover.look(&depths);
-            self.count += mover.seen.len();
-        }
+        movers.iter_mut().for_each(|mover| mover.look(&depths));
         self.at = Arc::default();
         let none = || Contours::with_room(camera, 0);
-        Some(Change { from: Arc::default(), to: self.at.clone(), gone: none(), come: none(), count: self.count })
+        Some(self.change(camera, Arc::default(), [none(), none()]))
+    }
+
+    /// The change to what is there now.
+    fn change(&mut self, camera: &Camera, from: Arc<()>, [gone, come]: [Contours; 2]) -> Change {
+        let mut moving = Contours::with_room(camera, self.movers.iter().map(|m| m.seen.len()).sum());
+        self.movers.iter().for_each(|mover| moving.append(&mover.seen));
+        self.count = self.shown + moving.len();
+        Change { from, to: self.at.clone(), gone, come, moving, count: self.count }
     }
 
     /// Composes the picture where some have moved, and looks again where they were and are.
     fn step(&mut self, camera: &Camera, same_extent: bool, moved: impl Fn(&Mover) -> bool) -> Option<Change> {
+        let anything = !same_extent || self.movers.iter().any(&moved);
         let Backdrop { still, movers, depth, extent, rows, pixels, areas, .. } = self;
         let (still, width) = (still.as_mut()?, camera.width as usize);
         Area::join(areas);
@@ -386,7 +397,9 @@ impl Backdrop {
             let span = |row: usize| row * width + area.left..row * width + area.right;
             rows.clear();
             for row in area.top..area.bottom {
-                let (Some(there), Some(still)) = (depth.get_mut(span(row)), still.depth.get(span(row))) else { continue };
+                let (Some(there), Some(still)) = (depth.get_mut(span(row)), still.depth.get(span(row))) else {
+                    continue;
+                };
                 rows.extend_from_slice(there);
                 there.copy_from_slice(still);
             }
@@ -396,7 +409,9 @@ impl Backdrop {
             );
             let mut before = rows.iter();
             for at in (area.top..area.bottom).flat_map(span) {
-                let (Some(now), Some(still), Some(before)) = (depth.get(at), still.depth.get(at), before.next()) else { break };
+                let (Some(now), Some(still), Some(before)) = (depth.get(at), still.depth.get(at), before.next()) else {
+                    break;
+                };
                 // Where there is a mover, what is seen may also change with the depth range.
                 let hidden = still_hides(at, *now) && still_hides(at, *before);
                 if !hidden && (now != before || (!same_extent && now != still)) {
@@ -438,17 +453,15 @@ impl Backdrop {
         for mover in movers {
             let (area, moved) = (mover.now.layer.looks, moved(mover));
             if moved || !same_extent || areas.iter().any(|dirty| dirty.meets(&area)) {
-                gone.append(&mover.seen);
                 mover.look(&depths);
-                come.append(&mover.seen);
             }
         }
-        self.count = self.count + come.len() - gone.len();
+        self.shown = self.shown + come.len() - gone.len();
         let from = self.at.clone();
-        if !(gone.is_empty() && come.is_empty()) {
+        if anything {
             self.at = Arc::default();
         }
-        Some(Change { from, to: self.at.clone(), gone, come, count: self.count })
+        Some(self.change(camera, from, [gone, come]))
     }
 }
 
@@ -489,7 +502,9 @@ impl Still {
         let rows = area.top.saturating_sub(REACH)..(area.bottom + REACH).min(camera.height as usize);
         let near = |d: &f32| f64::from(*d) < limit;
         area.pixels() > 0
-            && rows.map(|row| row * width + left..row * width + right).all(|row| self.depth.get(row).is_some_and(|row| row.iter().all(near)))
+            && rows
+                .map(|row| row * width + left..row * width + right)
+                .all(|row| self.depth.get(row).is_some_and(|row| row.iter().all(near)))
     }
 
     /// Whether what is known of the pieces holds for a depth range.

@@ -26,7 +26,7 @@ struct Followed {
     backdrop: Backdrop,
     tools: Tools,
     at: Arc<()>,
-    /// The pieces now, in some order, by their bits.
+    /// The pieces now of what stands still, in some order, by their bits.
     pieces: Vec<[u32; 5]>,
 }
 
@@ -36,12 +36,7 @@ fn bits(c: &Contours) -> Vec<[u32; 5]> {
 
 impl Followed {
     fn new(camera: &Camera) -> Followed {
-        Followed {
-            backdrop: Backdrop::new(camera),
-            tools: Tools::default(),
-            at: Arc::default(),
-            pieces: Vec::new(),
-        }
+        Followed { backdrop: Backdrop::new(camera), tools: Tools::default(), at: Arc::default(), pieces: Vec::new() }
     }
 
     /// Draws, and holds the picture and its change against everything drawn at once. Whether it was done by the backdrop, and by a change.
@@ -58,9 +53,14 @@ impl Followed {
             }
             self.pieces.extend(bits(&change.come));
         } else {
+            let moving = bits(&change.moving);
             self.pieces = bits(&got);
+            for piece in moving {
+                let at = self.pieces.iter().position(|p| *p == piece).expect("what moves is there");
+                self.pieces.swap_remove(at);
+            }
         }
-        let mut sorted = [self.pieces.clone(), bits(&wanted)];
+        let mut sorted = [[&self.pieces[..], &bits(&change.moving)].concat(), bits(&wanted)];
         sorted.iter_mut().for_each(|pieces| pieces.sort_unstable());
         assert_eq!(sorted[0], sorted[1]);
         self.at = change.to;

@@ -77,8 +77,7 @@ impl Trace {
 impl Trace {
     /// Where choices are written of which there are none in this state: nothing that is observed asks for them. In the order of the text.
     pub fn undrawn(&self) -> Vec<Span> {
-        let there: FxHashSet<u32> =
-            self.graph.nodes.iter().filter(|n| n.state == State::Clean).map(|n| n.op).collect();
+        let there: FxHashSet<u32> = self.graph.nodes.iter().filter(|n| n.state == State::Clean).map(|n| n.op).collect();
         let written = self.code.blocks.iter().flat_map(|b| (b.first..).zip(b.ops.iter().zip(&b.spans)));
         let absent = written.filter(|(op, (o, _))| matches!(o, Op::Draw { .. }) && !there.contains(&(*op as u32)));
         let mut spans: Vec<Span> = absent.map(|(_, (_, span))| *span).collect();

@@ -92,7 +92,7 @@ impl Steps {
     }
 }
 
-/// What is known of rendered contours of which some may come and go; it belongs to one comparator.
+/// What is known of rendered contours of which some may come and go, without those that move; it belongs to one comparator.
 #[derive(Debug, Clone, Default)]
 pub struct Tally {
     steps: Steps,
@@ -190,11 +190,14 @@ impl Chamfer {
             } else {
                 tally.steps = Steps::default();
                 self.count(&whole(), 1, &mut tally.steps);
+                self.count(&step.moving, -1, &mut tally.steps);
             }
             tally.of = Some(step.to.clone());
         }
+        let mut steps = tally.steps;
+        self.count(&step.moving, 1, &mut steps);
         let back = self.reverse.as_ref().and_then(|_| self.back(&whole(), scratch));
-        self.score(tally.steps.sums(), back)
+        self.score(steps.sums(), back)
     }
 
     fn mean(&self, forth: Sums, back: Option<Sums>) -> f64 {

@@ -168,10 +168,16 @@ impl ContourRatio {
             } else {
                 scratch.begin(self.capacity.groups());
                 self.count(&whole(), 1, scratch);
+                self.count(&step.moving, -1, scratch);
             }
             scratch.of = Some(step.to.clone());
         }
-        self.score(scratch)
+        scratch.settle(&self.capacity);
+        let before = scratch.mark();
+        self.count(&step.moving, 1, scratch);
+        let score = self.score(scratch);
+        scratch.restore(before);
+        score
     }
 
     /// Adds what elements bring, or takes it away.

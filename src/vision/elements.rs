@@ -95,10 +95,12 @@ pub struct Step<'a> {
     pub from: &'a Arc<()>,
     /// Stands for the contours now.
     pub to: &'a Arc<()>,
-    /// Those that are no longer there.
+    /// Those that are no longer there, besides what moves.
     pub gone: Elements<'a>,
-    /// Those that were not there before.
+    /// Those that were not there before, besides what moves.
     pub come: Elements<'a>,
+    /// All of what moves, told anew each time.
+    pub moving: Elements<'a>,
     /// How many there are now.
     pub count: usize,
 }

@@ -73,6 +73,14 @@ struct Claim {
     open: bool,
 }
 
+/// A state to come back to.
+pub(super) struct Mark {
+    known: usize,
+    paid: i64,
+    total: i64,
+    length: i64,
+}
+
 /// The claims of some contour, of which pieces may come and go. Reused from evaluation to evaluation.
 #[derive(Debug, Clone, Default)]
 pub struct Scratch {
@@ -85,6 +93,9 @@ pub struct Scratch {
     /// Length times score of what no group pays for, and length.
     pub(super) total: i64,
     pub(super) length: i64,
+    /// Claims as they were at the mark, and whether there is one.
+    log: Vec<(u32, Claim)>,
+    marked: bool,
     /// The contours whose claims these are, if they have a name.
     pub(super) of: Option<Arc<()>>,
 }
@@ -109,6 +120,9 @@ impl Scratch {
     pub(super) fn claim(&mut self, group: u32, length: f64, score: f64, sign: i64) {
         if let Some(claim) = self.claims.get_mut(group as usize) {
             if !claim.open {
+                if self.marked {
+                    self.log.push((group, *claim));
+                }
                 claim.open = true;
                 self.open.push(group);
                 if !claim.known {
@@ -119,6 +133,24 @@ impl Scratch {
             claim.length = claim.length.saturating_add(sign * ((length * FIXED) as i64).max(1));
             claim.score = claim.score.saturating_add(sign * (score * FIXED) as i64);
         }
+    }
+
+    /// Marks a settled state to come back to.
+    pub(super) fn mark(&mut self) -> Mark {
+        self.marked = true;
+        Mark { known: self.known.len(), paid: self.paid, total: self.total, length: self.length }
+    }
+
+    /// Goes back to a mark, once all is settled.
+    pub(super) fn restore(&mut self, mark: Mark) {
+        for (group, before) in self.log.drain(..) {
+            if let Some(claim) = self.claims.get_mut(group as usize) {
+                *claim = before;
+            }
+        }
+        self.known.truncate(mark.known);
+        self.marked = false;
+        (self.paid, self.total, self.length) = (mark.paid, mark.total, mark.length);
     }
 
     /// What a group pays for one more unit of length that would bring `score` for each.
@@ -133,7 +165,8 @@ impl Scratch {
     /// The scores paid. Each group's is rounded to the fixed point before they are added.
     pub(super) fn settle(&mut self, capacity: &Capacity) -> f64 {
         for id in self.open.drain(..) {
-            let (Some(claim), Some(&limit)) = (self.claims.get_mut(id as usize), capacity.limit.get(id as usize)) else {
+            let (Some(claim), Some(&limit)) = (self.claims.get_mut(id as usize), capacity.limit.get(id as usize))
+            else {
                 continue;
             };
             let limit = limit * FIXED;

@@ -233,8 +233,8 @@ impl<C, T: Default> Followed<C, T> {
 }
 
 fn step(change: &Change) -> Step<'_> {
-    let Change { from, to, gone, come, count } = change;
-    Step { from, to, gone: elements(gone), come: elements(come), count: *count }
+    let Change { from, to, gone, come, moving, count } = change;
+    Step { from, to, gone: elements(gone), come: elements(come), moving: elements(moving), count: *count }
 }
 
 #[derive(Debug)]
@@ -265,7 +265,9 @@ impl Likelihood for ContourOf {
         if let Some(change) = &*self.view.change(self.size) {
             let whole = OnceCell::new();
             let whole = || elements(whole.get_or_init(|| self.view.contours(self.size)));
-            return Ok(RATIOS.with_borrow_mut(|known| ratio.log_likelihood_after(&step(change), whole, known.of(&ratio))));
+            return Ok(
+                RATIOS.with_borrow_mut(|known| ratio.log_likelihood_after(&step(change), whole, known.of(&ratio)))
+            );
         }
         let contours = self.view.contours(self.size);
         Ok(RATIO.with_borrow_mut(|scratch| ratio.log_likelihood_with(&elements(&contours), scratch)))
