@@ -5,14 +5,16 @@
 //! Invariant: as for [`super::layers`], contours are those drawn at once, bit for bit. That rests on looks being monotone: what another mesh
 //! or a smaller depth range hides stays hidden with both, in `f64` too.
 
-use super::candidates::Candidates;
+mod mover;
+mod still;
+
+use self::mover::{Mover, Tools};
+use self::still::{Live, Still};
 use super::contours::Contours;
 use super::layers::{Layer, affine_bits, camera_bits};
-use super::project::{DepthRange, Projected};
 use super::raster::Area;
 use super::simd::vectorised;
-use super::trace::Room;
-use super::visibility::{Depths, Piece};
+use super::visibility::Depths;
 use super::{Camera, work};
 use crate::geom::{Instance, Mesh, MeshesMark, Solid};
 use std::cell::RefCell;
@@ -23,9 +25,6 @@ const FEWEST: usize = 3;
 
 /// Memory of a backdrop, in pieces; a scene of more is drawn at once.
 const MOST_PIECES: usize = 1 << 19;
-
-/// Half the width of the depth ranges that a backdrop is first made ready for, relatively.
-const FIRST_WIDTH: f64 = 0.005;
 
 /// How many drawings later a scene of which most moved is looked at again.
 const PATIENCE: u32 = 1024;
@@ -59,62 +58,6 @@ struct Known {
     list: MeshesMark,
     first: usize,
     count: usize,
-}
-
-/// A layer and whose it is.
-#[derive(Default)]
-struct Own {
-    mesh: Weak<Mesh>,
-    affine: [u64; 12],
-    layer: Layer,
-    /// Whether it was left undrawn, since the backdrop hides all of it.
-    hidden: bool,
-}
-
-/// A mesh that has moved: its layer where it is, and where it was before.
-#[derive(Default)]
-struct Mover {
-    leaf: usize,
-    now: Own,
-    before: Own,
-    seen: Contours,
-}
-
-/// A piece of the backdrop.
-struct Live {
-    piece: Piece,
-    leaf: usize,
-    shown: bool,
-}
-
-/// What stands still.
-#[derive(Default)]
-struct Still {
-    depth: Vec<f32>,
-    range: DepthRange,
-    /// All pieces, with the number of their mesh.
-    pieces: Vec<(Piece, usize)>,
-    /// The depth ranges of the scene for which the rest holds.
-    extents: [f64; 2],
-    /// Half the width of those, relatively.
-    width: f64,
-    /// Pieces that the backdrop does not hide at the greatest of these depth ranges.
-    live: Vec<Live>,
-    /// Of those, the ones it hides at the least.
-    unsure: Vec<u32>,
-    /// By pixel: the least depth that leaves any of those free that look there, whatever the depth range.
-    nearest: Vec<f64>,
-    /// Where in `looks` the pieces that look at each pixel begin.
-    start: Vec<u32>,
-    looks: Vec<u32>,
-}
-
-/// What drawing a layer needs room for.
-#[derive(Default)]
-pub(super) struct Tools {
-    projected: Projected,
-    candidates: Candidates,
-    room: Room,
 }
 
 /// A scene in the picture of one camera.
@@ -220,7 +163,7 @@ impl Backdrop {
         for (leaf, _) in &changed {
             if !std::mem::replace(&mut self.leaves[*leaf].moves, true) {
                 let at = self.movers.partition_point(|m| m.leaf < *leaf);
-                self.movers.insert(at, Mover { leaf: *leaf, ..Mover::default() });
+                self.movers.insert(at, Mover::new(*leaf));
                 self.still = None;
             }
         }
@@ -244,7 +187,9 @@ impl Backdrop {
             mover.move_to(instance, camera, tools, self.still.as_ref().filter(|_| known));
             self.areas.push(mover.now.layer.area);
         }
-        work::count(|work| work.kept += (count - changed.len()) as u64);
+        if !changed.is_empty() {
+            work::count(|work| work.kept += (count - changed.len()) as u64);
+        }
         let still = self.still.as_mut()?;
         let range = self.movers.iter().fold(still.range, |range, m| range.and(&m.now.layer.range));
         let (extent, before) = (range.extent(), self.extent);
@@ -331,7 +276,7 @@ impl Backdrop {
 
     /// Draws all meshes, those that stand still and the others.
     fn build(&mut self, solid: &Solid, camera: &Camera, tools: &mut Tools) -> Option<()> {
-        let mut still = Still { depth: vec![f32::INFINITY; camera.pixels()], width: FIRST_WIDTH, ..Still::default() };
+        let mut still = Still::new(camera);
         let (whole, width) = (Area::whole(camera), camera.width as usize);
         let mut movers = self.movers.iter_mut().peekable();
         for (leaf, instance) in solid.lists().flat_map(|list| list.iter()).enumerate() {
@@ -357,6 +302,10 @@ impl Backdrop {
     fn begin(&mut self, camera: &Camera) -> Option<Change> {
         let Backdrop { still, movers, depth, extent, .. } = self;
         let still = still.as_mut()?;
+        work::count(|work| {
+            work.partial += 1;
+            work.pixels += camera.pixels() as u64;
+        });
         depth.clone_from(&still.depth);
         movers.iter().for_each(|m| m.now.layer.show(depth, camera.width as usize, &Area::whole(camera)));
         let depths = Depths::new(depth, camera.width, camera.height, *extent)?;
@@ -386,7 +335,7 @@ impl Backdrop {
         let (still, width) = (still.as_mut()?, camera.width as usize);
         Area::join(areas);
         work::count(|work| {
-            work.partial += 1;
+            work.partial += u64::from(anything);
             work.pixels += areas.iter().map(Area::pixels).sum::<usize>() as u64;
         });
         // Where something is so near that all looks of the backdrop end at it, a change means nothing.
@@ -462,100 +411,6 @@ impl Backdrop {
             self.at = Arc::default();
         }
         Some(self.change(camera, from, [gone, come]))
-    }
-}
-
-impl Mover {
-    /// Its layer is that of the instance from here on; nothing is drawn of one that this backdrop hides.
-    fn move_to(&mut self, instance: &Instance, camera: &Camera, tools: &mut Tools, behind: Option<&Still>) {
-        let affine = affine_bits(&instance.affine);
-        let is_it = |own: &Own| {
-            !own.hidden && own.affine == affine && std::ptr::eq(own.mesh.as_ptr(), Arc::as_ptr(&instance.mesh))
-        };
-        if is_it(&self.now) {
-            return;
-        }
-        std::mem::swap(&mut self.now, &mut self.before);
-        if !is_it(&self.now) {
-            (self.now.mesh, self.now.affine) = (Arc::downgrade(&instance.mesh), affine);
-            let Tools { projected, candidates, room } = tools;
-            let hides = |range: &DepthRange, area: &Area| behind.is_some_and(|still| still.hides(range, area, camera));
-            self.now.hidden = !self.now.layer.draw(instance, camera, (projected, candidates), room, hides);
-        }
-    }
-
-    /// Tells which of its pieces are seen.
-    fn look(&mut self, depths: &Depths<'_>) {
-        self.seen.clear();
-        let Mover { now, seen, .. } = self;
-        now.layer.pieces.iter().filter(|piece| depths.visible(piece)).for_each(|piece| seen.push(piece));
-    }
-}
-
-impl Still {
-    /// Whether it hides all of a mesh with this depth range that covers pixels of an area only, contours included.
-    fn hides(&self, range: &DepthRange, area: &Area, camera: &Camera) -> bool {
-        let (limit, width) = (Depths::hiding(self.extents[1], range), camera.width as usize);
-        // Pieces may lie, and look, a little beside the area.
-        const REACH: usize = 4;
-        let (left, right) = (area.left.saturating_sub(REACH), (area.right + REACH).min(width));
-        let rows = area.top.saturating_sub(REACH)..(area.bottom + REACH).min(camera.height as usize);
-        let near = |d: &f32| f64::from(*d) < limit;
-        area.pixels() > 0
-            && rows
-                .map(|row| row * width + left..row * width + right)
-                .all(|row| self.depth.get(row).is_some_and(|row| row.iter().all(near)))
-    }
-
-    /// Whether what is known of the pieces holds for a depth range.
-    fn holds(&self, extent: f64) -> bool {
-        let [least, most] = self.extents;
-        least <= extent && extent <= most
-    }
-
-    /// Sorts the pieces for depth ranges about this one; for more of them if it has been done before.
-    fn settle(&mut self, camera: &Camera, extent: f64, again: bool) -> Option<()> {
-        self.width = if again { (2.0 * self.width).min(0.5) } else { self.width };
-        self.extents = [extent * (1.0 - self.width), extent * (1.0 + self.width)];
-        let [least, most] = self.extents.map(|extent| Depths::new(&self.depth, camera.width, camera.height, extent));
-        let (least, most) = (least?, most?);
-        self.nearest.clear();
-        self.nearest.resize(self.depth.len(), f64::INFINITY);
-        self.live.clear();
-        self.unsure.clear();
-        for (piece, leaf) in self.pieces.iter().filter(|(piece, _)| most.visible(piece)) {
-            if !least.visible(piece) {
-                self.unsure.push(self.live.len() as u32);
-            }
-            self.live.push(Live { piece: *piece, leaf: *leaf, shown: false });
-            for (pixel, depth) in most.looks(piece) {
-                if let Some(nearest) = self.nearest.get_mut(pixel) {
-                    *nearest = nearest.min(depth);
-                }
-            }
-        }
-        // A counting sort by pixel.
-        self.start.clear();
-        self.start.resize(self.depth.len() + 2, 0);
-        let at = |live: &Live| [0, 1].map(|side| live.piece.pixel(side).map(|p| p as usize)).into_iter().flatten();
-        for pixel in self.live.iter().flat_map(at) {
-            self.start[pixel + 2] += 1;
-        }
-        let mut sum = 0;
-        for start in &mut self.start {
-            sum += *start;
-            *start = sum;
-        }
-        self.looks.clear();
-        self.looks.resize(sum as usize, 0);
-        for (i, live) in self.live.iter().enumerate() {
-            for pixel in at(live) {
-                let place = &mut self.start[pixel + 1];
-                self.looks[*place as usize] = i as u32;
-                *place += 1;
-            }
-        }
-        Some(())
     }
 }
 
