@@ -8,6 +8,7 @@ use pcadlang::infer::selecting;
 use pcadlang::render::{Work, work};
 use pcadlang::report::table::{COLUMNS, aligned};
 use pcadlang::rng::{Purpose, StreamKey};
+use pcadlang::syntax::span::{FileId, Span};
 use pcadlang::trace::{Draws, Target, Trace};
 use serde_json::{Value, json};
 use std::collections::BTreeMap;
@@ -72,9 +73,13 @@ pub fn explain(model: &Model, o: &Outcome, seed: u64) -> Explanation {
     for (group, targets) in groups.values_mut() {
         group.drawn = targets.first().and_then(|t| drawn_by(&mut trace, *t, seed));
     }
-    let own = model.sources().get(pcadlang::syntax::span::FileId(0)).map_or("", |file| file.name());
+    let own = model.sources().get(FileId(0)).map_or("", |file| file.name());
     let sources = model.sources();
-    let written = |span| [sources.locate(span), sources.slice(span).lines().next().unwrap_or_default().to_owned()];
+    let line = |span: Span| {
+        let file = sources.get(span.file)?;
+        file.text().get(file.line_range(file.line_index(span.start as usize))).map(|line| line.trim().to_owned())
+    };
+    let written = |span| [sources.locate(span), line(span).unwrap_or_default()];
     let absent = trace.undrawn().into_iter().map(written).filter(|[place, _]| place.starts_with(own)).collect();
     let mut observed: Vec<String> = trace.observations().iter().map(|(a, _)| without_keys(&a.to_string())).collect();
     observed.sort();
