@@ -391,3 +391,38 @@ fn an_interrupted_run_keeps_its_draws() {
     let columns = rows[0].lines().next().unwrap().split(',').count();
     assert!(rows.iter().all(|r| r.ends_with('\n') && r.lines().all(|l| l.split(',').count() == columns)));
 }
+
+/// What `run --explain` says of a scene with something to skip: a choice that nothing asks for, one that no kernel names, an object that is out
+/// of the picture.
+#[test]
+fn explained() {
+    let f = Folder::new("explained");
+    f.write("disc.png", png(disc(64, 48, 34.0, 22.0, 15.0)));
+    f.write(
+        "balls.pcad",
+        "include \"std/scene.pcad\" as scene;
+data photo: image \"the picture\";
+for k in [\"x\", \"y\"] { t[k] ~ normal(0, 0.5) #place; }
+assume radius ~ uniform(0.3, 1.2);
+assume far    ~ uniform(9, 10);
+assume level  ~ normal(0, 1);
+assume idle   ~ normal(0, 1);
+let fixed = map(fn(x) { scene.affine(translate = [x, -1, -1]) * scene.sphere(0.3) }, [-1, 0, 1]);
+let ball = scene.affine(translate = [t.x, t.y, 0]) * scene.sphere(radius);
+let lost = scene.affine(translate = [far, 0, 0]) * scene.box(0.2);
+observe scene.contour(scene.render(scene.group([scene.group(fixed), ball, lost])), size = 64) = photo as picture;
+observe normal(level, 1) = 0.5 as height;
+infer { warmup 20 { drift(one($place)); } repeat 60 { drift(one($place)); block($place + @radius); mh(@far); collect radius; } }
+",
+    );
+    let job = ["run", "balls.pcad", "--observe", "disc.png", "--chains", "1", "--explain", "--out", "a"];
+    let done = f.succeeds(&job);
+    let lines = done.out.lines().skip_while(|l| !l.starts_with("modelled"));
+    let said: Vec<&str> =
+        lines.take_while(|l| !["warning:", "note:", "seed "].iter().any(|s| l.starts_with(s))).collect();
+    snapshot("explained", said.join("\n").trim_end());
+    let json: serde_json::Value = serde_json::from_str(&f.read("a/explained.json")).unwrap();
+    let radius = json["choices"].as_array().unwrap().iter().find(|c| c["address"] == "@radius").unwrap();
+    assert_eq!((&radius["choices"], &radius["kernels"][0]), (&1.into(), &"block($place + @radius)".into()));
+    assert_eq!(radius["one_proposal_draws"]["meshes_drawn"], 1);
+}

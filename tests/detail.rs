@@ -60,3 +60,51 @@ fn the_score_is_off_by_no_more_than_the_detail_allows() {
     }
     println!("{report}");
 }
+
+/// Three balls and a vase in front, all by the state alone: what was drawn on the way there, and by which thread, leaves no trace.
+#[test]
+fn the_level_depends_on_the_state_and_not_on_the_way_there() {
+    use pcadlang::lang::builtins::scene::{ImageValue, ViewValue};
+    use pcadlang::lang::value::Value;
+    use pcadlang::trace::{Draws, Trace};
+    let text = "include \"std/scene.pcad\" as scene;
+         data photo: image \"contours\";
+         for k in [\"x\", \"z\"] { t[k] ~ uniform(-12, 4); }
+         let balls = map(fn(x) { scene.affine(translate = [x, 0.6, -1]) * scene.sphere(0.5) }, [-1, 0.1, 1]);
+         let ys = linspace(0, 1.2, 20);
+         let vase = scene.affine(translate = [t.x, 0, t.z]) * scene.lathe([{ y: ys, r: 0.3 + 0.1 * sin(5 * ys) }]);
+         assume view = scene.render(scene.group([scene.group(balls), vase]), detail = 0.5);
+         observe scene.contour(view) = photo;";
+    let circle = (0..200).map(|i| f64::from(i) * std::f64::consts::TAU / 200.0);
+    let point = |f: fn(f64) -> f64, r: f32| circle.clone().map(|a| r * f(a) as f32).collect::<Vec<f32>>();
+    let (x, y) = (point(f64::cos, 30.0), point(f64::sin, 30.0));
+    let [x, y] = [x, y].map(|v| v.into_iter().map(|v| v + 64.0).collect());
+    let [tx, ty] = [point(f64::sin, 1.0), point(f64::cos, -1.0)];
+    let map = ContourMap { x, y, tx, ty, strength: vec![1.0; 200], ..ContourMap::new(SIZE, SIZE) };
+    let image = Value::object(ImageValue::contours(map, None));
+    let model = pcadlang::Program::parse(text)
+        .and_then(|p| p.observe("photo", image).camera(Camera::default_for(SIZE, SIZE)).compile())
+        .unwrap_or_else(|e| panic!("{e}"));
+    // Depth sets the level: from far away over near to the place.
+    let at = |trace: &mut Trace, [x, z]: [f64; 2]| {
+        for (address, value) in [("@t[x]", x), ("@t[z]", z)] {
+            trace.set(address, value, Draws::default()).unwrap();
+        }
+        let view = trace.global("view", Draws::default()).unwrap().unwrap();
+        let view = &view.downcast::<ViewValue>().unwrap().0;
+        (trace.log_joint().to_bits(), view.triangles(SIZE), view.contours(SIZE).as_ref().clone())
+    };
+    let place = [0.2, 0.5];
+    let direct = std::thread::scope(|s| s.spawn(|| at(&mut model.simulate(1, 0).unwrap(), place)).join().unwrap());
+    let mut trace = model.simulate(2, 0).unwrap();
+    let mut levels = Vec::new();
+    for way in [vec![[0.0, -12.0]], vec![[0.1, 3.0], [0.2, 2.9]], vec![[-9.0, 0.5], [0.2, 0.6], [0.21, 0.6]]] {
+        for step in way {
+            levels.push(at(&mut trace, step).1);
+        }
+        assert_eq!(at(&mut trace, place), direct);
+    }
+    levels.sort_unstable();
+    levels.dedup();
+    assert!(levels.len() >= 3, "other levels were drawn on the way: {levels:?}");
+}

@@ -66,6 +66,11 @@ fn shipped_scene() {
 }
 
 #[test]
+fn shipped_lathe_parts() {
+    same_of_picture("lathe_parts.pcad", Some(48), &[CUP], 60, 60);
+}
+
+#[test]
 fn shipped_human() {
     same_of_picture("human.pcad", Some(48), &[SKIER], 60, 60);
 }

@@ -180,6 +180,9 @@ pub struct Run {
     /// The time between checkpoints, which are what a run goes on from
     #[arg(long, value_parser = duration, default_value = "10s", value_name = "TIME")]
     pub checkpoint: Duration,
+    /// Also say what was modelled, proposed, redrawn and skipped, and why
+    #[arg(long)]
+    pub explain: bool,
     /// Print the summary as JSON
     #[arg(long)]
     pub json: bool,

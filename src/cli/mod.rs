@@ -8,6 +8,7 @@ mod contours;
 mod doc;
 mod earlier;
 mod evaluate;
+mod explain;
 mod files;
 mod fmt;
 mod given;

@@ -1,6 +1,7 @@
 //! `pcadlang run`: one run, its folder, and what is said of it at the end.
 
 use super::args::{Job, Run};
+use super::explain::{Explanation, explain};
 use super::job::{self, Interrupt, Manner, Outcome};
 use super::{Failure, earlier, plain, quality};
 use pcadlang::report::{RunDir, modes_table, seconds, table};
@@ -26,24 +27,30 @@ pub fn run(a: &Run) -> Result<(), Failure> {
     };
     let manner = Manner { live: !(a.quiet || a.json), checkpoint: a.checkpoint, resume: a.resume };
     let outcome = job::perform(job, &ready, &dir, &record, &interrupt, manner)?;
-    show(a, job, &dir, &outcome);
+    let explained = a.explain.then(|| explain(&ready.model, &outcome, job.sampling.seed));
+    if let Some(explained) = &explained {
+        let text = serde_json::to_vec_pretty(&explained.json()).unwrap_or_default();
+        job::write(&dir, "explained.json", &text)?;
+    }
+    show(a, job, &dir, &outcome, explained.as_ref());
     if outcome.interrupted { Err(Failure::Interrupted) } else { Ok(()) }
 }
 
 /// The end of a run on the terminal.
-fn show(a: &Run, job: &Job, dir: &RunDir, o: &Outcome) {
+fn show(a: &Run, job: &Job, dir: &RunDir, o: &Outcome, explained: Option<&Explanation>) {
     let seed = job.sampling.seed;
     if a.json {
         let all = job::summaries(&o.quantities, o.kernel_seconds());
-        println!(
-            "{}",
-            json!({
-                "out": dir.path(), "seed": seed, "quantities": all, "kernels": o.kernels, "choices": o.sites,
-                "modes": o.modes,
-                "warnings": o.warnings,
-                "approximate": o.approximate,
-            })
-        );
+        let mut said = json!({
+            "out": dir.path(), "seed": seed, "quantities": all, "kernels": o.kernels, "choices": o.sites,
+            "modes": o.modes,
+            "warnings": o.warnings,
+            "approximate": o.approximate,
+        });
+        if let Some(explained) = explained {
+            said["explained"] = explained.json();
+        }
+        println!("{said}");
         return;
     }
     if a.quiet {
@@ -56,6 +63,9 @@ fn show(a: &Run, job: &Job, dir: &RunDir, o: &Outcome) {
     let sites = table::sites(&o.sites);
     if !sites.is_empty() {
         print!("\n{sites}");
+    }
+    if let Some(explained) = explained {
+        print!("\n{}\n", explained.text());
     }
     for w in &o.warnings {
         println!("warning: {w}");

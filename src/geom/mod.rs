@@ -34,6 +34,7 @@ pub use lathe::{Caps, LatheGradient, Profile, lathe, pull_lathe};
 pub use mesh::{Edge, Edges, Mesh, NO_FACE, Topology};
 pub use patches::Patches;
 pub(crate) use patches::Run;
+pub(crate) use solid::MeshesMark;
 pub use solid::{Instance, PlacedGradient, Solid};
 pub use sphere::{pull_sphere, sphere};
 

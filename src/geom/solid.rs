@@ -10,7 +10,8 @@ use super::mesh::{MOST_PARTS, MOST_TRIANGLES};
 use super::{Affine, Bounds, Edge, Edges, GeomError, Mesh, NO_FACE, Topology, outer};
 use glam::{DMat3, DVec3};
 use std::fmt;
-use std::sync::{Arc, LazyLock};
+use std::ops::Deref;
+use std::sync::{Arc, LazyLock, Weak};
 
 /// A placed mesh.
 #[derive(Clone, Debug)]
@@ -45,10 +46,52 @@ type Lazy<T> = LazyLock<Arc<[T]>, Box<dyn FnOnce() -> Arc<[T]> + Send>>;
 /// Placed meshes.
 #[derive(Clone)]
 pub struct Solid {
-    instances: Arc<Lazy<Instance>>,
+    instances: Meshes,
+    /// What it was put together from, if it was.
+    group: Option<Arc<Group>>,
     landmarks: Arc<Lazy<Landmark>>,
     /// How many lists within each other wait for somebody to look.
     waiting: u32,
+}
+
+/// The members of a group.
+struct Group {
+    lists: Box<[Meshes]>,
+    /// How many meshes they have.
+    count: usize,
+}
+
+/// Placed meshes that do not change; solids that have a list in common share it.
+#[derive(Clone)]
+pub(crate) struct Meshes(Arc<Lazy<Instance>>);
+
+/// Tells a list of meshes from all others, also when it is gone.
+pub(crate) struct MeshesMark(Weak<Lazy<Instance>>);
+
+impl Meshes {
+    /// What it is told by.
+    pub fn mark(&self) -> MeshesMark {
+        MeshesMark(Arc::downgrade(&self.0))
+    }
+
+    /// Whether it is the list that the mark is of.
+    pub fn is(&self, mark: &MeshesMark) -> bool {
+        std::ptr::eq(mark.0.as_ptr(), Arc::as_ptr(&self.0))
+    }
+
+    /// How many part numbers they need.
+    fn part_count(&self) -> u16 {
+        let after = |i: &Instance| i.first_part.saturating_add(i.mesh.topology.part_count);
+        self.iter().map(after).max().unwrap_or(0)
+    }
+}
+
+impl Deref for Meshes {
+    type Target = [Instance];
+
+    fn deref(&self) -> &[Instance] {
+        &self.0
+    }
 }
 
 /// The most that wait: each is a call within a call when somebody looks.
@@ -105,7 +148,7 @@ impl Solid {
 
     /// Placed meshes, without named points.
     pub fn of(instances: Arc<[Instance]>) -> Solid {
-        Solid { instances: ready(instances), landmarks: ready(Arc::default()), waiting: 0 }
+        Solid { instances: Meshes(ready(instances)), group: None, landmarks: ready(Arc::default()), waiting: 0 }
     }
 
     /// The same with these named points in place of its own (world coordinates); a name that occurs again gets `#2`, `#3`, …
@@ -134,7 +177,8 @@ impl Solid {
     where
         M: IntoIterator<Item = Instance>,
     {
-        Solid { instances: later(move || make().into_iter().collect()), landmarks: ready(Arc::default()), waiting: 1 }
+        let instances = Meshes(later(move || make().into_iter().collect()));
+        Solid { instances, group: None, landmarks: ready(Arc::default()), waiting: 1 }
     }
 
     /// Its meshes.
@@ -144,17 +188,18 @@ impl Solid {
 
     /// Moved by an affine map.
     pub fn placed(&self, by: Affine) -> Solid {
-        let of = Arc::clone(&self.instances);
+        let of = self.instances.clone();
         let placed = move || of.iter().map(|i| Instance { affine: by * i.affine, ..i.clone() }).collect();
         let of = Arc::clone(&self.landmarks);
         let moved = move || of.iter().map(|l| Landmark { position: by.point(l.position), ..l.clone() }).collect();
-        Solid { instances: later(placed), landmarks: later(moved), waiting: self.waiting + 1 }.looked_at_in_time()
+        let (instances, landmarks) = (Meshes(later(placed)), later(moved));
+        Solid { instances, group: None, landmarks, waiting: self.waiting + 1 }.looked_at_in_time()
     }
 
     /// The same, made at once where too much waits.
     fn looked_at_in_time(mut self) -> Solid {
         if self.waiting >= MOST_WAITING {
-            LazyLock::force(&self.instances);
+            LazyLock::force(&self.instances.0);
             LazyLock::force(&self.landmarks);
             self.waiting = 0;
         }
@@ -172,24 +217,37 @@ impl Solid {
 
     /// Several together; part numbers follow one another, and so do landmarks.
     pub fn group(solids: &[Solid]) -> Solid {
-        let mut first: u16 = 0;
-        let mut instances = Vec::new();
-        for s in solids {
-            for i in s.instances() {
-                instances.push(Instance { first_part: first.saturating_add(i.first_part), ..i.clone() });
+        let lists: Box<[Meshes]> = solids.iter().map(|s| s.instances.clone()).collect();
+        let group = Arc::new(Group { lists, count: solids.iter().map(Solid::mesh_count).sum() });
+        let of = Arc::clone(&group);
+        let instances = Meshes(later(move || {
+            let (mut first, mut instances) = (0u16, Vec::with_capacity(of.count));
+            for list in &of.lists {
+                let numbered = |i: &Instance| Instance { first_part: first.saturating_add(i.first_part), ..i.clone() };
+                instances.extend(list.iter().map(numbered));
+                first = first.saturating_add(list.part_count());
             }
-            first = first.saturating_add(s.part_count());
-        }
+            instances.into()
+        }));
         let of: Vec<_> = solids.iter().map(|s| Arc::clone(&s.landmarks)).collect();
         let landmarks = later(move || unique(of.iter().flat_map(|landmarks| landmarks.iter().cloned())));
         let waiting = solids.iter().map(|s| s.waiting).max().unwrap_or(0) + 1;
-        Solid { landmarks, waiting, ..Solid::of(instances.into()) }.looked_at_in_time()
+        Solid { instances, group: Some(group), landmarks, waiting }.looked_at_in_time()
+    }
+
+    /// The number of meshes.
+    pub fn mesh_count(&self) -> usize {
+        self.group.as_ref().map_or_else(|| self.instances().len(), |group| group.count)
+    }
+
+    /// Its meshes in turn, in the lists of the members that it was put together from. They have part numbers of their own.
+    pub(crate) fn lists(&self) -> impl Iterator<Item = &Meshes> {
+        self.group.as_ref().map_or(std::slice::from_ref(&self.instances), |group| &group.lists).iter()
     }
 
     /// The number of parts.
     pub fn part_count(&self) -> u16 {
-        let after = |i: &Instance| i.first_part.saturating_add(i.mesh.topology.part_count);
-        self.instances.iter().map(after).max().unwrap_or(0)
+        self.instances.part_count()
     }
 
     /// The smallest box around all vertices; `None` if there are none.

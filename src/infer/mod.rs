@@ -11,6 +11,7 @@ mod default_plan;
 #[doc(hidden)]
 pub mod diagnostics;
 pub mod draws;
+mod explained;
 mod expr;
 mod force;
 mod foreign;
@@ -39,8 +40,9 @@ pub use best::{BestSoFar, BestState};
 pub use chains::run_chains;
 #[doc(hidden)]
 pub use default_plan::default_plan;
-pub(crate) use force::put as force;
 #[doc(hidden)]
+pub use explained::{Selecting, selecting};
+pub(crate) use force::put as force;
 pub use foreign::KernelCall;
 pub(crate) use foreign::KernelMaker;
 pub(crate) use init::attempts;

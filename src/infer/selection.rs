@@ -22,6 +22,16 @@ pub(crate) fn scope(e: &Expr, env: &mut Scope) -> Result<kernel::Scope, Box<RunE
     Ok(kernel::Scope { selector: selector(e, env)?, pick: Pick::All })
 }
 
+/// Whether an argument is a selection, with `one(…)` or `each(…)` around it or not.
+pub(super) fn target(e: &Expr) -> bool {
+    match &e.kind {
+        ExprKind::Address(_) | ExprKind::TagSel { .. } => true,
+        ExprKind::Binary { left, .. } => target(left),
+        _ => super::plan::call(e)
+            .is_some_and(|(name, args)| pick(name).is_some() && args.first().is_some_and(|a| target(&a.value))),
+    }
+}
+
 fn pick(name: &str) -> Option<Pick> {
     match name {
         "one" => Some(Pick::One),

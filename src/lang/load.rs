@@ -46,6 +46,7 @@ pub const EMBEDDED: &[(&str, &str)] = &[
     ("autorig.pcad", include_str!("../../programs/autorig.pcad")),
     ("lathe.pcad", include_str!("../../programs/lathe.pcad")),
     ("lathe.settings.json", include_str!("../../programs/lathe.settings.json")),
+    ("lathe_parts.pcad", include_str!("../../programs/lathe_parts.pcad")),
     ("lathe_paper.pcad", include_str!("../../programs/lathe_paper.pcad")),
     ("scene.pcad", include_str!("../../programs/scene.pcad")),
     ("std/scene.pcad", include_str!("../../programs/std/scene.pcad")),

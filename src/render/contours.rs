@@ -8,7 +8,7 @@ use super::looked::Looked;
 use super::project::{DepthRange, Placement, Projected, project};
 use super::trace::{Room, trace_mesh};
 use super::visibility::{Depths, Piece};
-use super::{Camera, layers};
+use super::{Camera, backdrop, layers, work};
 use crate::geom::Solid;
 use std::cell::RefCell;
 
@@ -53,7 +53,9 @@ impl Contours {
     /// The contours of a solid, seen in a camera's image. Draws its own depth image; of a solid of several meshes, only
     /// what this thread has not drawn lately.
     pub fn of(solid: &Solid, camera: &Camera) -> Contours {
-        layers::contours(solid, camera).unwrap_or_else(|| Contours::drawn(solid, camera))
+        backdrop::contours(solid, camera)
+            .or_else(|| layers::contours(solid, camera))
+            .unwrap_or_else(|| Contours::drawn(solid, camera))
     }
 
     /// As [`Contours::of`], everything drawn anew.
@@ -150,10 +152,16 @@ fn with_scratch<T>(work: impl FnOnce(&mut Scratch) -> T) -> T {
 impl Scratch {
     /// Projects a solid and finds its pieces of contour, hidden or not.
     fn trace(&mut self, solid: &Solid, camera: &Camera) -> DepthRange {
+        work::count(|work| work.whole += 1);
         let range = project(solid, camera, &mut self.projected);
         self.pieces.clear();
         for (i, instance) in solid.instances().iter().enumerate() {
             let (placement, vertices) = (Placement::new(camera, &instance.affine), self.projected.mesh(i));
+            if vertices.outside(camera) {
+                work::count(|work| work.outside += 1);
+                continue;
+            }
+            work::drawn(&instance.mesh);
             let pieces = &mut self.pieces;
             trace_mesh(&instance.mesh, &placement, camera, &vertices, &mut self.room, |piece, _| pieces.push(piece));
         }

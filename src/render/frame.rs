@@ -3,11 +3,11 @@
 //! No anti-aliasing, no colours (see `shade`). Invariant: `depth` has `width * height` entries, row by row from the top,
 //! finite exactly where something is seen; the other channels have as many entries or, when not asked for, none.
 
-use super::Camera;
 use super::candidates::Candidates;
 use super::project::{Lens, Projected, project};
 use super::raster::{draw_nearness, each_triangle, empty};
 use super::simd::vectorised;
+use super::{Camera, work};
 use crate::geom::Solid;
 use glam::{DVec3, Vec3};
 use std::cell::RefCell;
@@ -62,6 +62,8 @@ impl Frame {
         channels: Channels,
         (projected, candidates): &mut (Projected, Candidates),
     ) -> Frame {
+        work::count(|work| work.whole += 1);
+        solid.instances().iter().for_each(|i| work::drawn(&i.mesh));
         let (width, height) = (camera.width, camera.height);
         let (mut depth, mut part, mut normal) = (Vec::new(), Vec::new(), Vec::new());
         match channels {

@@ -14,7 +14,7 @@ use super::raster::{Area, draw_mesh};
 use super::simd::vectorised;
 use super::trace::{Room, trace_mesh};
 use super::visibility::{BESIDE, Depths, Piece};
-use super::{Camera, Projection};
+use super::{Camera, Projection, work};
 use crate::geom::{Affine, Instance, Mesh, Solid};
 use std::cell::RefCell;
 use std::sync::{Arc, Weak};
@@ -33,14 +33,14 @@ const BYTES: usize = 32 << 20;
 
 /// What one mesh adds to a picture.
 #[derive(Default)]
-struct Layer {
-    area: Area,
+pub(super) struct Layer {
+    pub area: Area,
     /// Depth in the area, row by row, infinite off the mesh.
     depth: Vec<f32>,
-    range: DepthRange,
-    pieces: Vec<Piece>,
+    pub range: DepthRange,
+    pub pieces: Vec<Piece>,
     /// Holds all pixels that the pieces look at.
-    looks: Area,
+    pub looks: Area,
     /// The pieces seen in the picture it was shown in last.
     seen: Contours,
 }
@@ -101,7 +101,7 @@ thread_local! {
 
 /// The contours of a solid, composed of layers; `None` for solids that are better drawn at once.
 pub(super) fn contours(solid: &Solid, camera: &Camera) -> Option<Contours> {
-    let count = solid.instances().len();
+    let count = solid.mesh_count();
     let most_bytes = camera.pixels().saturating_mul(count).saturating_mul(size_of::<f32>());
     if !(FEWEST..=MOST).contains(&count) || most_bytes > BYTES {
         return None;
@@ -158,6 +158,7 @@ impl Layers {
             let before = self.shown.get(i).copied();
             let kept = before.map(|shown| shown.at).filter(|&at| self.slots.get(at).is_some_and(is_it));
             let found = kept.or_else(|| self.slots.iter().position(is_it));
+            work::count(|work| work.kept += u64::from(found.is_some()));
             let at = found.unwrap_or_else(|| self.draw(instance, camera, affine, eye));
             let Some(slot) = self.slots.get_mut(at) else { continue };
             slot.used = self.clock;
@@ -173,13 +174,11 @@ impl Layers {
         }
         let gone = self.shown.drain(solid.instances().len().min(self.shown.len())..);
         self.dirty.extend(gone.map(|shown| shown.area));
-        self.dirty.retain(|area| area.pixels() > 0);
-        // Where much has changed, areas overlap: one around them all is less.
-        let around = self.dirty.iter().fold(Area::default(), |all, area| all.with(area));
-        if self.dirty.iter().map(Area::pixels).sum::<usize>() > around.pixels() {
-            self.dirty.clear();
-            self.dirty.push(around);
-        }
+        Area::join(&mut self.dirty);
+        work::count(|work| {
+            work.partial += 1;
+            work.pixels += self.dirty.iter().map(Area::pixels).sum::<usize>() as u64;
+        });
         let Layers { dirty, depth, shown, slots, .. } = self;
         for area in dirty {
             for row in area.top..area.bottom {
@@ -212,7 +211,8 @@ impl Layers {
         self.bytes -= slot.layer.bytes();
         (slot.mesh, slot.affine, slot.camera) = (Arc::downgrade(&instance.mesh), affine, eye);
         (slot.made, slot.seen_at) = ((self.clock, at), 0);
-        slot.layer.draw(instance, camera, (&mut self.projected, &mut self.candidates), &mut self.room);
+        let tools = (&mut self.projected, &mut self.candidates);
+        slot.layer.draw(instance, camera, tools, &mut self.room, |_, _| false);
         self.bytes += slot.layer.bytes();
         at
     }
@@ -228,30 +228,44 @@ impl Layers {
 }
 
 impl Layer {
-    /// Draws a mesh alone.
-    fn draw(
+    /// Draws a mesh alone, unless it is told hidden by its depth range and the pixels it reaches; whether it was drawn.
+    pub fn draw(
         &mut self,
         instance: &Instance,
         camera: &Camera,
         (projected, candidates): (&mut Projected, &mut Candidates),
         room: &mut Room,
-    ) {
+        hidden: impl FnOnce(&DepthRange, &Area) -> bool,
+    ) -> bool {
         let placement = Placement::new(camera, &instance.affine);
         projected.clear();
         self.range = projected.add(&instance.mesh, &placement, &Lens::new(camera));
         let vertices = projected.mesh(0);
         self.area = Area::around(&vertices, camera);
+        self.pieces.clear();
+        self.seen.clear();
+        self.depth.clear();
+        self.looks = Area::default();
+        if vertices.outside(camera) {
+            work::count(|work| work.outside += 1);
+            return true;
+        }
+        if hidden(&self.range, &self.area) {
+            work::count(|work| work.hidden += 1);
+            self.area = Area::default();
+            return false;
+        }
+        work::drawn(&instance.mesh);
         draw_mesh(&instance.mesh, &placement, camera, &vertices, candidates, &self.area, &mut self.depth);
         to_depth(camera, &mut self.depth);
-        self.pieces.clear();
         trace_mesh(&instance.mesh, &placement, camera, &vertices, room, |piece, _| self.pieces.push(piece));
         self.looks = Area::looked_at(&self.pieces, camera);
-        self.seen.clear();
+        true
     }
 
     /// Puts what is nearer than the picture into it, in some area.
     #[inline(always)]
-    fn show(&self, picture: &mut [f32], width: usize, within: &Area) {
+    pub fn show(&self, picture: &mut [f32], width: usize, within: &Area) {
         let area = self.area.common(within);
         if area.pixels() == 0 {
             return;
@@ -275,6 +289,16 @@ impl Layer {
 }
 
 impl Area {
+    /// Leaves out those without pixels. Where much has changed, areas overlap: then one around them all is less.
+    pub(super) fn join(areas: &mut Vec<Area>) {
+        areas.retain(|area| area.pixels() > 0);
+        let around = areas.iter().fold(Area::default(), |all, area| all.with(area));
+        if areas.iter().map(Area::pixels).sum::<usize>() > around.pixels() {
+            areas.clear();
+            areas.push(around);
+        }
+    }
+
     /// A rectangle with all pixels that pieces look at.
     fn looked_at(pieces: &[Piece], camera: &Camera) -> Area {
         let ends = |side: u32, at: fn(&Piece) -> f32| {
@@ -292,11 +316,11 @@ impl Area {
     }
 }
 
-fn affine_bits(affine: &Affine) -> [u64; 12] {
+pub(super) fn affine_bits(affine: &Affine) -> [u64; 12] {
     affine.0.to_cols_array().map(f64::to_bits)
 }
 
-fn camera_bits(camera: &Camera) -> [u64; 17] {
+pub(super) fn camera_bits(camera: &Camera) -> [u64; 17] {
     let (kind, scale, cx, cy) = match camera.projection {
         Projection::Pinhole { focal_px, cx, cy } => (0, focal_px, cx, cy),
         Projection::Orthographic { units_per_pixel, cx, cy } => (1, units_per_pixel, cx, cy),

@@ -48,7 +48,9 @@ impl Looked {
         let area = Area::whole(camera);
         for (i, item) in solid.instances().iter().enumerate() {
             let (placement, vertices) = (Placement::new(camera, &item.affine), projected.mesh(i));
-            fill_mesh(&item.mesh, &placement, camera, &vertices, candidates, (&area, Some(&*marks)), depth);
+            if !vertices.outside(camera) {
+                fill_mesh(&item.mesh, &placement, camera, &vertices, candidates, (&area, Some(&*marks)), depth);
+            }
         }
         let pinhole = Lens::new(camera).pinhole;
         for (i, word) in marks.words().iter().enumerate() {

@@ -3,6 +3,7 @@
 //! Not here: meshes and transforms (`geom`), comparing pictures (`vision`). Nothing in this module draws random
 //! numbers, and the same input gives the same output on every machine.
 
+mod backdrop;
 mod batch;
 mod camera;
 mod camera_json;
@@ -30,6 +31,7 @@ mod triangle;
 mod view;
 mod visibility;
 mod wander;
+mod work;
 
 #[cfg(test)]
 mod extremes_tests;
@@ -38,9 +40,11 @@ mod testing;
 
 use crate::num::simd;
 
+pub use backdrop::Change;
 pub use batch::{BatchRenderer, ContourBatch, ContourSlice, Cores, Scene};
 pub use camera::{Camera, CameraError, Projection};
 pub use contours::Contours;
 pub use frame::{Channels, Frame};
 pub use shade::shade;
 pub use view::View;
+pub use work::{Work, work};

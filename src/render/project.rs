@@ -346,6 +346,16 @@ impl Vertices<'_> {
         self.places.iter().fold(Place::INFINITY, |a, b| a.min(*b))
     }
 
+    /// Whether all of the mesh is behind the eye, or beside the picture by half a pixel at least: it covers no pixel and has no contour there.
+    pub fn outside(&self, camera: &Camera) -> bool {
+        if !self.whole {
+            return self.nearness.iter().all(|n| *n == f32::INFINITY);
+        }
+        let [left, top, right, bottom] = self.least_of_all().to_array();
+        let (width, height) = (camera.width as f32, camera.height as f32);
+        left > width || top > height || -right < -1.0 || -bottom < -1.0
+    }
+
     /// A triangle ready to be drawn, if it is to be: see [`Triangle::new`].
     #[inline(always)]
     pub fn triangle(&self, topology: &Topology, face: u32, extent: Extent, back: f64) -> Option<Triangle> {

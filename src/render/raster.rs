@@ -143,7 +143,10 @@ pub(super) fn draw_nearness(
     let area = Area::whole(camera);
     for (i, item) in solid.instances().iter().enumerate() {
         let placement = Placement::new(camera, &item.affine);
-        fill_mesh(&item.mesh, &placement, camera, &projected.mesh(i), candidates, (&area, None), buffer);
+        let vertices = projected.mesh(i);
+        if !vertices.outside(camera) {
+            fill_mesh(&item.mesh, &placement, camera, &vertices, candidates, (&area, None), buffer);
+        }
     }
     range
 }

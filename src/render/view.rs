@@ -4,7 +4,7 @@
 //! contours are computed once, and every caller gets the same `Arc`.
 
 use super::detail::Drawn;
-use super::{Camera, Channels, Contours, Frame, Scene};
+use super::{Camera, Change, Channels, Contours, Frame, Scene, backdrop};
 use crate::geom::Solid;
 use glam::DVec3;
 use std::sync::{Arc, Mutex, MutexGuard, PoisonError};
@@ -21,6 +21,7 @@ pub struct View {
     frames: BySize<Frame>,
     depths: BySize<Frame>,
     contours: BySize<Contours>,
+    changes: BySize<Option<Change>>,
 }
 
 impl View {
@@ -33,7 +34,7 @@ impl View {
     /// of what is drawn, whatever the size of the picture; 0 for meshes as they are.
     pub fn with_detail(solid: Solid, camera: Camera, detail: f64) -> View {
         let (frames, depths, contours) = (Mutex::default(), Mutex::default(), Mutex::default());
-        View { solid, camera, detail, frames, depths, contours }
+        View { solid, camera, detail, frames, depths, contours, changes: Mutex::default() }
     }
 
     /// The solid.
@@ -81,6 +82,15 @@ impl View {
                 Some(frame) => Contours::with_depth(&solid, &camera, &frame.depth),
                 None => Contours::of(&solid, &camera),
             }
+        })
+    }
+
+    /// What [`View::contours`] has more and less than those drawn last by this thread, without making the list: in a scene most of which stands
+    /// still; `None` for others.
+    pub fn change(&self, size: u32) -> Arc<Option<Change>> {
+        once(&self.changes, size, || {
+            let camera = self.camera.scaled_to(size);
+            backdrop::change(&self.drawn(&camera).solid, &camera)
         })
     }
 

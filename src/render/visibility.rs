@@ -5,6 +5,8 @@
 //! is answered by the nearest pixel inside. What a look needs besides the depth image and the object's depth range is worked
 //! out when the piece is made, so a piece can be kept and looked at again when something else has moved.
 
+use super::project::DepthRange;
+
 /// How far beside a piece to look, in pixels.
 pub(super) const BESIDE: f64 = 1.2;
 
@@ -143,10 +145,28 @@ impl<'a> Depths<'a> {
     #[inline]
     fn free(&self, side: &Side, depth: f64, most: f64) -> bool {
         let seen = self.depth.get(side.pixel as usize).map_or(f64::INFINITY, |&d| f64::from(d));
+        seen >= self.threshold(side, depth, most)
+    }
+
+    /// The least depth that leaves a piece free.
+    #[inline]
+    fn threshold(&self, side: &Side, depth: f64, most: f64) -> f64 {
         let slack = side.slack.min(most);
         // Outside the image only the object itself can be looked at: be generous, its side may bend towards the eye.
         let slack = if side.inside { slack } else { slack.max(10.0 * self.tolerance) };
-        seen >= depth - slack - self.tolerance - 1e-6 * depth
+        depth - slack - self.tolerance - 1e-6 * depth
+    }
+
+    /// The pixels that a piece looks at, each with the least depth there that leaves it free.
+    pub fn looks(&self, piece: &Piece) -> impl Iterator<Item = (usize, f64)> {
+        let (most, depth) = (self.most[usize::from(piece.edge)], piece.depth);
+        let sides = piece.sides.into_iter().filter(|side| side.pixel != NOWHERE);
+        sides.map(move |side| (side.pixel as usize, self.threshold(&side, depth, most)))
+    }
+
+    /// Less than the least depth that leaves any piece free of a mesh with this depth range.
+    pub fn hiding(extent: f64, range: &DepthRange) -> f64 {
+        range.near - (SILHOUETTE_SLACK.max(EDGE_SLACK) + TOLERANCE) * extent * 1.001 - 2e-6 * range.far.abs()
     }
 
     /// Whether a piece is seen.

@@ -7,6 +7,8 @@ use super::node::*;
 use super::{Address, Target, Trace};
 use crate::lang::code::{Callee, Code, Op, Operand};
 use crate::num::ExactSum;
+use crate::syntax::span::Span;
+use rustc_hash::FxHashSet;
 use std::sync::Arc;
 
 /// What a term of the log joint density is of.
@@ -69,6 +71,19 @@ impl Trace {
     /// The choices that a choice's distribution was made from, and those that decide whether it is there; by address.
     pub fn origins(&self, t: Target) -> Vec<Address> {
         self.graph.origins(&self.code, t.node)
+    }
+}
+
+impl Trace {
+    /// Where choices are written of which there are none in this state: nothing that is observed asks for them. In the order of the text.
+    pub fn undrawn(&self) -> Vec<Span> {
+        let there: FxHashSet<u32> = self.graph.nodes.iter().filter(|n| n.state == State::Clean).map(|n| n.op).collect();
+        let written = self.code.blocks.iter().flat_map(|b| (b.first..).zip(&b.spans));
+        let is_choice = |op: &u32| matches!(self.code.ops.get(*op as usize), Some(Op::Draw { .. }));
+        let absent = written.filter(|(op, _)| is_choice(op) && !there.contains(op));
+        let mut spans: Vec<Span> = absent.map(|(_, span)| *span).collect();
+        spans.sort_by_key(|s| (s.file, s.start));
+        spans
     }
 }
 
@@ -175,6 +190,19 @@ mod tests {
 
     fn at(t: &Trace, address: &str) -> Target {
         t.find(&address.parse().unwrap()).unwrap_or_else(|| panic!("{address}"))
+    }
+
+    #[test]
+    fn what_nothing_asks_for_is_not_drawn() {
+        let text = "assume a ~ normal(0, 1); assume idle ~ normal(0, 1); assume c ~ flip(0.5);
+             assume x = if c { b ~ normal(0, 1); b } else { d ~ normal(5, 1); d }; observe normal(a + x, 1) = 2;";
+        let mut t = trace(text);
+        for c in [true, false] {
+            t.set("@c", c, Default::default()).unwrap();
+            let absent: Vec<&str> = t.undrawn().iter().map(|s| &text[s.start as usize..s.end as usize]).collect();
+            // Of each its distribution.
+            assert_eq!(absent, ["normal(0, 1)", if c { "normal(5, 1)" } else { "normal(0, 1)" }]);
+        }
     }
 
     fn spelt(r: &Reach) -> Vec<String> {

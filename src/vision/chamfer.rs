@@ -1,19 +1,20 @@
 //! The paper's stochastic comparator: how far the rendered contours lie from the observed ones, scored by a normal density.
 //! A likelihood without a sampler. Lengths are percent of the image diagonal, so a score does not depend on resolution.
 //! In clutter some wrong object often lies closer to the observed edges than the true one; for photographs use
-//! [`ContourRatio`](super::contour_ratio::ContourRatio). Invariant: scores are finite, continuous in positions, and sums run
-//! in the elements' order in f64.
+//! [`ContourRatio`](super::contour_ratio::ContourRatio). Invariant: scores are finite, continuous in positions, and those of the
+//! rendered contours exactly independent of the elements' order.
 
 mod gradient;
 mod reverse;
 
 use self::reverse::Reverse;
 use super::contour_map::ContourMap;
-use super::elements::{ComparatorError, Element, Elements, check};
+use super::elements::{ComparatorError, Element, Elements, Step, check};
 use super::field::{CHANNELS, Edges, PER_RADIAN, channels_of, turn_between};
 use crate::num::LN_SQRT_2PI;
 use crate::num::simd::vectorised;
 use crate::platform::threads::side_by_side;
+use std::sync::Arc;
 
 pub use self::reverse::{MOST_OBSERVED, Scratch};
 
@@ -63,6 +64,39 @@ pub struct Chamfer {
     reverse: Option<Reverse>,
     /// Percent of the diagonal per pixel of the frame.
     percent: f64,
+}
+
+/// Sums over one direction, in steps of 2^-32: exact, so what was added can be taken away again.
+#[derive(Debug, Clone, Copy, Default)]
+struct Steps {
+    length: i64,
+    first: i64,
+    second: i64,
+}
+
+/// Steps of a unit.
+const FIXED: f64 = (1u64 << 32) as f64;
+
+impl Steps {
+    #[inline(always)]
+    fn add(&mut self, length: f64, distance: f64, sign: i64) {
+        let add = |sum: &mut i64, x: f64| *sum = sum.saturating_add(sign * (x * FIXED) as i64);
+        add(&mut self.length, length);
+        add(&mut self.first, length * distance);
+        add(&mut self.second, length * distance * distance);
+    }
+
+    fn sums(&self) -> Sums {
+        let [length, first, second] = [self.length, self.first, self.second].map(|sum| sum as f64 / FIXED);
+        Sums { length, first, second }
+    }
+}
+
+/// What is known of rendered contours of which some may come and go, without those that move; it belongs to one comparator.
+#[derive(Debug, Clone, Default)]
+pub struct Tally {
+    steps: Steps,
+    of: Option<Arc<()>>,
 }
 
 /// Sums over one direction.
@@ -126,10 +160,7 @@ impl Chamfer {
 
     /// [`Chamfer::distance`] without allocation once the scratch has grown.
     pub fn distance_with(&self, elements: &Elements<'_>, scratch: &mut Scratch) -> f64 {
-        match self.back(elements, scratch) {
-            None => self.forth(elements).mean(),
-            Some(back) => 0.5 * (self.forth(elements).mean() + back.mean()),
-        }
+        self.mean(self.forth(elements), self.back(elements, scratch))
     }
 
     /// The log-likelihood. `Mean`: log normal(distance; 0, sigma). `Sum`: that of every element's distance, times its length
@@ -140,14 +171,51 @@ impl Chamfer {
 
     /// [`Chamfer::log_likelihood`] without allocation once the scratch has grown.
     pub fn log_likelihood_with(&self, elements: &Elements<'_>, scratch: &mut Scratch) -> f64 {
+        self.score(self.forth(elements), self.back(elements, scratch))
+    }
+
+    /// [`Chamfer::log_likelihood`] of contours of which the tally may know those before: the same, bit for bit, at the cost of what changed where
+    /// it is not symmetric. `whole` gives all of them.
+    pub fn log_likelihood_after<'a>(
+        &self,
+        step: &Step<'_>,
+        whole: impl Fn() -> Elements<'a>,
+        tally: &mut Tally,
+        scratch: &mut Scratch,
+    ) -> f64 {
+        if !step.leads_to(tally.of.as_ref()) {
+            if step.follows(tally.of.as_ref()) {
+                self.count(&step.gone, -1, &mut tally.steps);
+                self.count(&step.come, 1, &mut tally.steps);
+            } else {
+                tally.steps = Steps::default();
+                self.count(&whole(), 1, &mut tally.steps);
+                self.count(&step.moving, -1, &mut tally.steps);
+            }
+            tally.of = Some(step.to.clone());
+        }
+        let mut steps = tally.steps;
+        self.count(&step.moving, 1, &mut steps);
+        let back = self.reverse.as_ref().and_then(|_| self.back(&whole(), scratch));
+        self.score(steps.sums(), back)
+    }
+
+    fn mean(&self, forth: Sums, back: Option<Sums>) -> f64 {
+        match back {
+            None => forth.mean(),
+            Some(back) => 0.5 * (forth.mean() + back.mean()),
+        }
+    }
+
+    fn score(&self, forth: Sums, back: Option<Sums>) -> f64 {
         let sum = |s: Sums| {
             let s =
                 if s.length > 0.0 { s } else { Sums { length: 100.0, first: 0.0, second: 100.0 * NOTHING * NOTHING } };
             s.length * self.log_normal(0.0) - 0.5 * s.second / (self.options.sigma * self.options.sigma)
         };
         let score = match self.options.mode {
-            Mode::Mean => self.log_normal(self.distance_with(elements, scratch)),
-            Mode::Sum => sum(self.forth(elements)) + self.back(elements, scratch).map_or(0.0, sum),
+            Mode::Mean => self.log_normal(self.mean(forth, back)),
+            Mode::Sum => sum(forth) + back.map_or(0.0, sum),
         };
         score.max(f64::MIN)
     }
@@ -180,16 +248,23 @@ impl Chamfer {
     }
 
     fn forth(&self, elements: &Elements<'_>) -> Sums {
-        vectorised(
+        let mut steps = Steps::default();
+        self.count(elements, 1, &mut steps);
+        steps.sums()
+    }
+
+    /// Adds what elements bring, or takes it away.
+    fn count(&self, elements: &Elements<'_>, sign: i64, steps: &mut Steps) {
+        let mut own = *steps;
+        *steps = vectorised(
             #[inline(always)]
             || {
-                let mut sums = Sums::default();
                 for e in elements.in_view() {
-                    sums.add(f64::from(e.length * e.weight) * self.percent, self.cut(self.read(&e).0));
+                    own.add(f64::from(e.length * e.weight) * self.percent, self.cut(self.read(&e).0), sign);
                 }
-                sums
+                own
             },
-        )
+        );
     }
 
     fn back(&self, elements: &Elements<'_>, scratch: &mut Scratch) -> Option<Sums> {

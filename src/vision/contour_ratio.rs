@@ -16,7 +16,7 @@ mod ratio;
 use self::background::scores;
 use self::credit::{Capacity, NO_GROUP};
 use super::contour_map::ContourMap;
-use super::elements::{ComparatorError, Elements, check};
+use super::elements::{ComparatorError, Elements, Step, check};
 use super::field::{CHANNELS, Edge, Edges, channels_of, turn_between};
 use crate::platform::threads::side_by_side;
 
@@ -148,13 +148,46 @@ impl ContourRatio {
 
     /// [`ContourRatio::log_likelihood`] without allocation once the scratch has grown.
     pub fn log_likelihood_with(&self, elements: &Elements<'_>, scratch: &mut Scratch) -> f64 {
-        let samples = self.grid.width as usize * self.grid.height as usize;
         scratch.begin(self.capacity.groups());
+        self.count(elements, 1, scratch);
+        self.score(scratch)
+    }
+
+    /// [`ContourRatio::log_likelihood`] of contours of which the scratch may know those before: the same, bit for bit, at the cost of what
+    /// changed. `whole` gives all of them. A scratch belongs to one comparator.
+    pub fn log_likelihood_after<'a>(
+        &self,
+        step: &Step<'_>,
+        whole: impl FnOnce() -> Elements<'a>,
+        scratch: &mut Scratch,
+    ) -> f64 {
+        if !step.leads_to(scratch.of.as_ref()) {
+            if step.follows(scratch.of.as_ref()) {
+                self.count(&step.gone, -1, scratch);
+                self.count(&step.come, 1, scratch);
+            } else {
+                scratch.begin(self.capacity.groups());
+                self.count(&whole(), 1, scratch);
+                self.count(&step.moving, -1, scratch);
+            }
+            scratch.of = Some(step.to.clone());
+        }
+        scratch.settle(&self.capacity);
+        let before = scratch.mark();
+        self.count(&step.moving, 1, scratch);
+        let score = self.score(scratch);
+        scratch.restore(before);
+        score
+    }
+
+    /// Adds what elements bring, or takes it away.
+    fn count(&self, elements: &Elements<'_>, sign: i64, scratch: &mut Scratch) {
+        let samples = self.grid.width as usize * self.grid.height as usize;
         // Exact in integers: sums of terms that are rounded one by one do not depend on their order.
-        let (mut total, mut length) = (0i64, 0i64);
+        let (mut total, mut length) = (scratch.total, scratch.length);
         for e in elements.in_view() {
             let weight = (f64::from(e.length * e.weight) * self.percent).min(1e4);
-            length = length.saturating_add((weight * FIXED) as i64);
+            length = length.saturating_add(sign * (weight * FIXED) as i64);
             let (low, high, f) = channels_of(e.tx, e.ty);
             let corners = self.grid.corners(e.x, e.y);
             let shares = corners.weights();
@@ -163,15 +196,20 @@ impl ContourRatio {
                     let Some(cell) = self.cells.get(k * samples + at) else { continue };
                     let length = weight * f64::from(part * share);
                     if cell.group == NO_GROUP {
-                        total = total.saturating_add((length * f64::from(cell.score) * FIXED) as i64);
+                        total = total.saturating_add(sign * (length * f64::from(cell.score) * FIXED) as i64);
                     } else {
-                        scratch.claim(cell.group, length, length * f64::from(cell.score));
+                        scratch.claim(cell.group, length, length * f64::from(cell.score), sign);
                     }
                 }
             }
         }
-        let evidence = total as f64 / FIXED + scratch.settle(&self.capacity);
-        let length = length as f64 / FIXED;
+        (scratch.total, scratch.length) = (total, length);
+    }
+
+    /// The score of what has been counted.
+    fn score(&self, scratch: &mut Scratch) -> f64 {
+        let evidence = scratch.total as f64 / FIXED + scratch.settle(&self.capacity);
+        let length = scratch.length as f64 / FIXED;
         let missing = (1.0 - length / self.options.least).max(0.0);
         let penalty = missing * self.options.nothing * libm::log(1.0 - self.options.foreground);
         let score = (evidence + penalty) * self.options.weight / self.options.unit;

@@ -2,6 +2,7 @@
 //! elements are in view, and errors. It is not a renderer and knows no meshes. Invariant: an element that is not finite or
 //! lies out of the picture has weight 0, so NaN cannot enter a score.
 
+use std::sync::Arc;
 use thiserror::Error;
 
 /// Rendered contour pieces in a frame of `width` x `height` pixels; pixel (0, 0) has its centre at (0.5, 0.5), y down.
@@ -84,6 +85,35 @@ impl Elements<'_> {
             slope[axis] = sign;
         }
         slope
+    }
+}
+
+/// From some rendered contours to others. Contours are told by the address of what stands for them.
+#[derive(Debug, Clone, Copy)]
+pub struct Step<'a> {
+    /// Stands for the contours before.
+    pub from: &'a Arc<()>,
+    /// Stands for the contours now.
+    pub to: &'a Arc<()>,
+    /// Those that are no longer there, besides what moves.
+    pub gone: Elements<'a>,
+    /// Those that were not there before, besides what moves.
+    pub come: Elements<'a>,
+    /// All of what moves, told anew each time.
+    pub moving: Elements<'a>,
+    /// How many there are now.
+    pub count: usize,
+}
+
+impl Step<'_> {
+    /// Whether it begins at these contours, and is shorter than beginning from nothing.
+    pub(super) fn follows(&self, known: Option<&Arc<()>>) -> bool {
+        self.gone.len() + self.come.len() < self.count && known.is_some_and(|known| Arc::ptr_eq(known, self.from))
+    }
+
+    /// Whether it ends at these contours.
+    pub(super) fn leads_to(&self, known: Option<&Arc<()>>) -> bool {
+        known.is_some_and(|known| Arc::ptr_eq(known, self.to))
     }
 }
 

@@ -36,7 +36,7 @@ pub use contour_ratio::{ContourRatio, ContourRatioOptions};
 pub use depth::{DepthLikelihood, DepthMap};
 pub use detector::{ContourDetector, GradientDetector};
 pub use distance_transform::{DistanceMap, distance_transform};
-pub use elements::{ComparatorError, Elements};
+pub use elements::{ComparatorError, Elements, Step};
 pub use error::VisionError;
 pub use keypoints::{KeypointLikelihood, KeypointOptions, Keypoints};
 pub use mask::{Mask, MaskLikelihood};

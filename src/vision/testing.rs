@@ -133,3 +133,27 @@ pub(super) fn clutter(width: u32, height: u32, n: usize, seed: u64) -> Pieces {
     }
     pieces
 }
+
+/// Pieces that come and go, some of each step, each time with all that are there; the steps are told by what they were and are.
+pub(super) fn comings_and_goings(all: &Pieces, mut each: impl FnMut(&super::elements::Step<'_>, &Pieces)) {
+    let only = |keep: &dyn Fn(usize) -> bool| {
+        let mut some = Pieces::new(all.width, all.height);
+        for i in (0..all.x.len()).filter(|i| keep(*i)) {
+            some.push(all.x[i], all.y[i], libm::atan2f(all.ty[i], all.tx[i]), all.length[i]);
+        }
+        some
+    };
+    // Now a few, now most of them.
+    let there = |step: usize, i: usize| (i * 7919 + step * [1, 31, 977][step % 3]) % 100 > [20, 25, 90][step % 3];
+    let mut from = std::sync::Arc::new(());
+    for step in 1..40 {
+        let (whole, moves) = (only(&|i| there(step, i)), |i: usize| i % 5 == 2);
+        let gone = only(&|i| !moves(i) && there(step - 1, i) && !there(step, i));
+        let come = only(&|i| !moves(i) && !there(step - 1, i) && there(step, i));
+        let moving = only(&|i| moves(i) && there(step, i));
+        let to = std::sync::Arc::new(());
+        let ([gone, come, moving], count) = ([&gone, &come, &moving].map(Pieces::elements), whole.x.len());
+        each(&super::elements::Step { from: &from, to: &to, gone, come, moving, count }, &whole);
+        from = to;
+    }
+}

@@ -1,6 +1,6 @@
 //! Tests of the chamfer comparator against plainly written distances.
 
-use super::super::testing::{Pieces, clutter, numbers};
+use super::super::testing::{Pieces, clutter, comings_and_goings, numbers};
 use super::*;
 
 fn options() -> ChamferOptions {
@@ -241,4 +241,25 @@ fn extremes_give_numbers_or_errors() {
     // One pixel.
     let c = Chamfer::prepare(&Pieces::new(1, 1).circle(0.5, 0.5, 0.1).map(), 1, 1, &options()).unwrap();
     assert!(c.distance(&Pieces::new(1, 1).circle(0.5, 0.5, 0.4).elements()).is_finite());
+}
+
+#[test]
+fn what_comes_and_goes_gives_what_is_there_to_the_last_bit() {
+    let seen = Pieces::new(96, 96).circle(0.5, 0.5, 0.3).circle(0.3, 0.6, 0.2);
+    let all = Pieces::new(96, 96).circle(0.52, 0.5, 0.3).circle(0.4, 0.4, 0.35).circle(0.99, 0.5, 0.1);
+    for options in variants() {
+        let chamfer = Chamfer::prepare(&seen.map(), 96, 96, &options).unwrap();
+        let (mut tally, mut asked) = (Tally::default(), 0);
+        comings_and_goings(&all, |step, whole| {
+            let count = std::cell::Cell::new(0);
+            let elements = || {
+                count.set(count.get() + 1);
+                whole.elements()
+            };
+            let score = chamfer.log_likelihood_after(step, elements, &mut tally, &mut Scratch::default());
+            assert_eq!(score.to_bits(), chamfer.log_likelihood(&whole.elements()).to_bits());
+            asked += usize::from(count.get() > 0);
+        });
+        assert!(options.symmetric || asked < 39, "{asked}");
+    }
 }

@@ -7,6 +7,7 @@
 
 use super::super::field::{CHANNELS, Edges};
 use rustc_hash::FxHashMap;
+use std::sync::Arc;
 
 /// Where nothing pays.
 pub(super) const NO_GROUP: u32 = u32::MAX;
@@ -61,24 +62,48 @@ impl Capacity {
     }
 }
 
-/// What a group was asked for.
+/// What a group was asked for, and what it paid when that was settled last.
 #[derive(Debug, Clone, Copy, Default)]
 struct Claim {
     length: i64,
     score: i64,
+    paid: i64,
+    /// Whether it was ever asked, and whether so since it was settled.
+    known: bool,
+    open: bool,
 }
 
-/// Memory that evaluations reuse.
+/// A state to come back to.
+pub(super) struct Mark {
+    known: usize,
+    paid: i64,
+    total: i64,
+    length: i64,
+}
+
+/// The claims of some contour, of which pieces may come and go. Reused from evaluation to evaluation.
 #[derive(Debug, Clone, Default)]
 pub struct Scratch {
     claims: Vec<Claim>,
-    touched: Vec<u32>,
+    /// Groups that were ever asked.
+    known: Vec<u32>,
+    /// Groups asked since the last settlement.
+    open: Vec<u32>,
+    paid: i64,
+    /// Length times score of what no group pays for, and length.
+    pub(super) total: i64,
+    pub(super) length: i64,
+    /// Claims as they were at the mark, and whether there is one.
+    log: Vec<(u32, Claim)>,
+    marked: bool,
+    /// The contours whose claims these are, if they have a name.
+    pub(super) of: Option<Arc<()>>,
 }
 
 impl Scratch {
     /// Makes room for `groups`, all unclaimed.
     pub(super) fn begin(&mut self, groups: usize) {
-        for id in self.touched.drain(..) {
+        for id in self.known.drain(..) {
             if let Some(claim) = self.claims.get_mut(id as usize) {
                 *claim = Claim::default();
             }
@@ -86,18 +111,46 @@ impl Scratch {
         if self.claims.len() < groups {
             self.claims.resize(groups, Claim::default());
         }
+        self.open.clear();
+        (self.paid, self.total, self.length, self.of) = (0, 0, 0, None);
     }
 
-    /// Adds a claim: a length of contour in percent and the score (length times log ratio) it would bring.
+    /// Adds a claim (`sign` 1) or takes it back (-1): a length of contour in percent and the score (length times log ratio) it would bring.
     #[inline]
-    pub(super) fn claim(&mut self, group: u32, length: f64, score: f64) {
+    pub(super) fn claim(&mut self, group: u32, length: f64, score: f64, sign: i64) {
         if let Some(claim) = self.claims.get_mut(group as usize) {
-            if claim.length == 0 {
-                self.touched.push(group);
+            if !claim.open {
+                if self.marked {
+                    self.log.push((group, *claim));
+                }
+                claim.open = true;
+                self.open.push(group);
+                if !claim.known {
+                    claim.known = true;
+                    self.known.push(group);
+                }
             }
-            claim.length = claim.length.saturating_add(((length * FIXED) as i64).max(1));
-            claim.score = claim.score.saturating_add((score * FIXED) as i64);
+            claim.length = claim.length.saturating_add(sign * ((length * FIXED) as i64).max(1));
+            claim.score = claim.score.saturating_add(sign * (score * FIXED) as i64);
         }
+    }
+
+    /// Marks a settled state to come back to.
+    pub(super) fn mark(&mut self) -> Mark {
+        self.marked = true;
+        Mark { known: self.known.len(), paid: self.paid, total: self.total, length: self.length }
+    }
+
+    /// Goes back to a mark, once all is settled.
+    pub(super) fn restore(&mut self, mark: Mark) {
+        for (group, before) in self.log.drain(..) {
+            if let Some(claim) = self.claims.get_mut(group as usize) {
+                *claim = before;
+            }
+        }
+        self.known.truncate(mark.known);
+        self.marked = false;
+        (self.paid, self.total, self.length) = (mark.paid, mark.total, mark.length);
     }
 
     /// What a group pays for one more unit of length that would bring `score` for each.
@@ -110,10 +163,10 @@ impl Scratch {
     }
 
     /// The scores paid. Each group's is rounded to the fixed point before they are added.
-    pub(super) fn settle(&self, capacity: &Capacity) -> f64 {
-        let mut total = 0i64;
-        for &id in &self.touched {
-            let (Some(claim), Some(&limit)) = (self.claims.get(id as usize), capacity.limit.get(id as usize)) else {
+    pub(super) fn settle(&mut self, capacity: &Capacity) -> f64 {
+        for id in self.open.drain(..) {
+            let (Some(claim), Some(&limit)) = (self.claims.get_mut(id as usize), capacity.limit.get(id as usize))
+            else {
                 continue;
             };
             let limit = limit * FIXED;
@@ -122,8 +175,9 @@ impl Scratch {
             } else {
                 claim.score
             };
-            total = total.saturating_add(paid);
+            self.paid = self.paid.saturating_add(paid - claim.paid);
+            (claim.paid, claim.open) = (paid, false);
         }
-        total as f64 / FIXED
+        self.paid as f64 / FIXED
     }
 }

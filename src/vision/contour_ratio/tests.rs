@@ -1,6 +1,6 @@
 //! Tests of the contour ratio: a plain reference for one element, and properties.
 
-use super::super::testing::{Pieces, clutter};
+use super::super::testing::{Pieces, clutter, comings_and_goings};
 use super::*;
 
 fn options() -> ContourRatioOptions {
@@ -212,4 +212,27 @@ fn gradient_is_that_of_differences() {
         let bad = drawn.differing(&out, |e| c.log_likelihood(e));
         assert!(bad <= out.len() / 5, "{o:?}: {bad} of {} differ", 4 * out.len());
     }
+}
+
+#[test]
+fn what_comes_and_goes_gives_what_is_there_to_the_last_bit() {
+    let seen = Pieces::new(96, 96).circle(0.5, 0.5, 0.3).circle(0.3, 0.6, 0.2);
+    let all = Pieces::new(96, 96).circle(0.5, 0.5, 0.3).circle(0.5, 0.5, 0.305).circle(0.4, 0.4, 0.35);
+    // Little credit, so that groups are asked for more than they pay.
+    let ratio = ContourRatio::prepare(&seen.map(), 96, 96, &ContourRatioOptions { credit: 0.8, ..options() }).unwrap();
+    let (mut scratch, mut asked) = (Scratch::default(), 0);
+    comings_and_goings(&all, |step, whole| {
+        let mut count = 0;
+        let elements = || {
+            count += 1;
+            whole.elements()
+        };
+        let score = ratio.log_likelihood_after(step, elements, &mut scratch);
+        assert_eq!(score.to_bits(), ratio.log_likelihood(&whole.elements()).to_bits());
+        // The same contours again cost nothing.
+        let again = ratio.log_likelihood_after(step, || panic!("they are known"), &mut scratch);
+        assert_eq!(again.to_bits(), score.to_bits());
+        asked += count;
+    });
+    assert!((1..39).contains(&asked), "{asked}");
 }

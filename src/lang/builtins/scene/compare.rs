@@ -7,16 +7,16 @@ use crate::lang::adjoint::Adjoint;
 use crate::lang::builtins::{Arg, Args, Pulled, Row, Type, arg, opt};
 use crate::lang::error::Fault;
 use crate::lang::value::{Likelihood, Value};
-use crate::render::{Contours, Frame, View};
+use crate::render::{Change, Contours, Frame, View};
 use crate::rng::Stream;
 use crate::vision::chamfer::{self, Mode};
 use crate::vision::contour_ratio;
 use crate::vision::{
     Chamfer, ChamferOptions, ContourRatio, ContourRatioOptions, DepthLikelihood, DepthMap, Elements, MaskLikelihood,
-    VisionError,
+    Step, VisionError,
 };
-use std::cell::RefCell;
-use std::sync::Arc;
+use std::cell::{OnceCell, RefCell};
+use std::sync::{Arc, Weak};
 
 pub(super) const SECTION: &str = "Comparing";
 pub(super) const SEEN: Arg = arg("view", VIEW, "The view.");
@@ -202,6 +202,39 @@ pub(super) fn same_shape((w, h): (u32, u32), view: &View, what: &str) -> Result<
 thread_local! {
     static RATIO: RefCell<contour_ratio::Scratch> = RefCell::default();
     static CHAMFER: RefCell<chamfer::Scratch> = RefCell::default();
+    static RATIOS: RefCell<Followed<ContourRatio, contour_ratio::Scratch>> = RefCell::default();
+    static CHAMFERS: RefCell<Followed<Chamfer, chamfer::Tally>> = RefCell::default();
+}
+
+/// What a thread knows of the contours that comparators saw last.
+struct Followed<C, T>(Vec<(Weak<C>, T)>);
+
+/// The most comparators of a kind that a thread knows something of.
+const FOLLOWED: usize = 8;
+
+impl<C, T> Default for Followed<C, T> {
+    fn default() -> Self {
+        Followed(Vec::new())
+    }
+}
+
+impl<C, T: Default> Followed<C, T> {
+    /// That of one comparator, which comes to the front.
+    fn of(&mut self, comparator: &Arc<C>) -> &mut T {
+        match self.0.iter().position(|(c, _)| std::ptr::eq(c.as_ptr(), Arc::as_ptr(comparator))) {
+            Some(at) => self.0[..=at].rotate_right(1),
+            None => {
+                self.0.truncate(FOLLOWED - 1);
+                self.0.insert(0, (Arc::downgrade(comparator), T::default()));
+            }
+        }
+        &mut self.0[0].1
+    }
+}
+
+fn step(change: &Change) -> Step<'_> {
+    let Change { from, to, gone, come, moving, count } = change;
+    Step { from, to, gone: elements(gone), come: elements(come), moving: elements(moving), count: *count }
 }
 
 #[derive(Debug)]
@@ -212,15 +245,13 @@ struct ContourOf {
 }
 
 impl ContourOf {
-    /// The comparator for what was observed, and the contours it compares.
-    fn prepared(&self, observed: &Value) -> Result<(Arc<ContourRatio>, Arc<Contours>), String> {
+    /// The comparator for what was observed.
+    fn prepared(&self, observed: &Value) -> Result<Arc<ContourRatio>, String> {
         let image = image(observed, &self.view, self.name())?;
-        let contours = self.view.contours(self.size);
-        let key = (self.options.clone(), contours.width, contours.height);
-        let ratio = image.ratios.get(key, |(options, w, h)| {
+        let camera = self.view.camera().scaled_to(self.size);
+        image.ratios.get((self.options.clone(), camera.width, camera.height), |(options, w, h)| {
             ContourRatio::prepare(image.map(), *w, *h, options).map_err(|e| format!("scene.contour: {e}"))
-        })?;
-        Ok((ratio, contours))
+        })
     }
 }
 
@@ -230,13 +261,21 @@ impl Likelihood for ContourOf {
     }
 
     fn log_density(&self, observed: &Value) -> Result<f64, String> {
-        let (ratio, contours) = self.prepared(observed)?;
+        let ratio = self.prepared(observed)?;
+        if let Some(change) = &*self.view.change(self.size) {
+            let whole = OnceCell::new();
+            let whole = || elements(whole.get_or_init(|| self.view.contours(self.size)));
+            return Ok(
+                RATIOS.with_borrow_mut(|known| ratio.log_likelihood_after(&step(change), whole, known.of(&ratio)))
+            );
+        }
+        let contours = self.view.contours(self.size);
         Ok(RATIO.with_borrow_mut(|scratch| ratio.log_likelihood_with(&elements(&contours), scratch)))
     }
 
     /// By the view.
     fn gradient(&self, observed: &Value) -> Option<Adjoint> {
-        let (ratio, contours) = self.prepared(observed).ok()?;
+        let (ratio, contours) = (self.prepared(observed).ok()?, self.view.contours(self.size));
         let mut by_piece = Vec::new();
         RATIO.with_borrow_mut(|scratch| ratio.gradient(&elements(&contours), scratch, &mut by_piece));
         Some(by_contours(&self.view, self.size, &by_piece))
@@ -260,15 +299,13 @@ struct ChamferOf {
 }
 
 impl ChamferOf {
-    /// The comparator for what was observed, and the contours it compares.
-    fn prepared(&self, observed: &Value) -> Result<(Arc<Chamfer>, Arc<Contours>), String> {
+    /// The comparator for what was observed.
+    fn prepared(&self, observed: &Value) -> Result<Arc<Chamfer>, String> {
         let image = image(observed, &self.view, self.name())?;
-        let contours = self.view.contours(self.size);
-        let key = (self.options.clone(), contours.width, contours.height);
-        let chamfer = image.chamfers.get(key, |(options, w, h)| {
+        let camera = self.view.camera().scaled_to(self.size);
+        image.chamfers.get((self.options.clone(), camera.width, camera.height), |(options, w, h)| {
             Chamfer::prepare(image.map(), *w, *h, options).map_err(|e| format!("scene.chamfer: {e}"))
-        })?;
-        Ok((chamfer, contours))
+        })
     }
 }
 
@@ -278,13 +315,22 @@ impl Likelihood for ChamferOf {
     }
 
     fn log_density(&self, observed: &Value) -> Result<f64, String> {
-        let (chamfer, contours) = self.prepared(observed)?;
-        Ok(CHAMFER.with_borrow_mut(|scratch| chamfer.log_likelihood_with(&elements(&contours), scratch)))
+        let chamfer = self.prepared(observed)?;
+        CHAMFER.with_borrow_mut(|scratch| {
+            if let Some(change) = &*self.view.change(self.size) {
+                let whole = OnceCell::new();
+                let whole = || elements(whole.get_or_init(|| self.view.contours(self.size)));
+                return Ok(CHAMFERS.with_borrow_mut(|known| {
+                    chamfer.log_likelihood_after(&step(change), whole, known.of(&chamfer), scratch)
+                }));
+            }
+            Ok(chamfer.log_likelihood_with(&elements(&self.view.contours(self.size)), scratch))
+        })
     }
 
     /// By the view and by sigma.
     fn gradient(&self, observed: &Value) -> Option<Adjoint> {
-        let (chamfer, contours) = self.prepared(observed).ok()?;
+        let (chamfer, contours) = (self.prepared(observed).ok()?, self.view.contours(self.size));
         let mut by_piece = Vec::new();
         let by_sigma =
             CHAMFER.with_borrow_mut(|scratch| chamfer.gradient(&elements(&contours), scratch, &mut by_piece));

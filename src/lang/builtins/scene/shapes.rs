@@ -67,7 +67,7 @@ pub(super) const TABLE: &[Row] = &[
         if members.is_empty() {
             return Err(a.wrong(0, "an array of solids"));
         }
-        let count: usize = members.iter().map(|s| s.instances().len()).sum();
+        let count: usize = members.iter().map(Solid::mesh_count).sum();
         if count > MOST_MESHES {
             let message = format!("scene.group: a group of {count} meshes; at most {MOST_MESHES}");
             return Err(Fault::new(FaultKind::Limit, message));

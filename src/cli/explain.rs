@@ -1,0 +1,239 @@
+//! `run --explain`: what was modelled, proposed, redrawn and skipped, and why.
+//!
+//! What is drawn is told by trying: one proposal of a choice of each group, in the last state of the first chain, which is then taken back.
+
+use super::job::Outcome;
+use pcadlang::Model;
+use pcadlang::infer::selecting;
+use pcadlang::render::{Work, work};
+use pcadlang::report::table::{COLUMNS, aligned};
+use pcadlang::rng::{Purpose, StreamKey};
+use pcadlang::syntax::span::{FileId, Span};
+use pcadlang::trace::{Draws, Target, Trace};
+use serde_json::{Value, json};
+use std::collections::BTreeMap;
+
+/// Proposals that are tried of each group: what a thread keeps of pictures is made by the first ones.
+const TRIES: u64 = 4;
+
+/// Choices whose addresses differ in keys only.
+struct Group {
+    name: String,
+    choices: usize,
+    /// Kernels that select some of them.
+    kernels: Vec<String>,
+    /// Proposals of one of them at a time, and how many were accepted.
+    alone: [u64; 2],
+    /// What one proposal drew; none if it is impossible here.
+    drawn: Option<Work>,
+}
+
+/// All there is to say of a run.
+pub struct Explanation {
+    groups: Vec<Group>,
+    observed: Vec<String>,
+    /// Where choices are written that are not there, and how.
+    absent: Vec<[String; 2]>,
+}
+
+/// Explains a run by the last state of its first chain.
+pub fn explain(model: &Model, o: &Outcome, seed: u64) -> Explanation {
+    let Some(first) = o.chains.first() else {
+        return Explanation { groups: Vec::new(), observed: Vec::new(), absent: Vec::new() };
+    };
+    let mut trace = first.last.clone();
+    let mut groups: BTreeMap<String, (Group, Vec<Target>)> = BTreeMap::new();
+    for t in trace.all_targets().to_vec() {
+        let name = without_keys(&trace.address(t).to_string());
+        let new = || {
+            let group = Group { name: name.clone(), choices: 0, kernels: Vec::new(), alone: [0; 2], drawn: None };
+            (group, Vec::new())
+        };
+        let (group, targets) = groups.entry(name.clone()).or_insert_with(new);
+        group.choices += 1;
+        targets.push(t);
+    }
+    for site in &o.sites {
+        if let Some((group, _)) = groups.get_mut(&without_keys(&site.address)) {
+            group.alone[0] += site.proposals;
+            group.alone[1] += site.accepted;
+        }
+    }
+    let code = model.code().clone();
+    let plan = model.plan().map(|(plan, _)| plan).unwrap_or_default();
+    for kernel in selecting(&code, &plan, &mut trace) {
+        let selection = trace.select(&kernel.selector);
+        let chosen = trace.targets(selection).to_vec();
+        for (group, targets) in groups.values_mut() {
+            if targets.iter().any(|t| chosen.contains(t)) {
+                group.kernels.push(kernel.kernel.clone());
+            }
+        }
+    }
+    for (group, targets) in groups.values_mut() {
+        group.drawn = targets.first().and_then(|t| drawn_by(&mut trace, *t, seed));
+    }
+    let own = model.sources().get(FileId(0)).map_or("", |file| file.name());
+    let sources = model.sources();
+    let line = |span: Span| {
+        let file = sources.get(span.file)?;
+        file.text().get(file.line_range(file.line_index(span.start as usize))).map(|line| line.trim().to_owned())
+    };
+    let written = |span| [sources.locate(span), line(span).unwrap_or_default()];
+    let absent = trace.undrawn().into_iter().map(written).filter(|[place, _]| place.starts_with(own)).collect();
+    let mut observed: Vec<String> = trace.observations().iter().map(|(a, _)| without_keys(&a.to_string())).collect();
+    observed.sort();
+    observed.dedup();
+    Explanation { groups: groups.into_values().map(|(group, _)| group).collect(), observed, absent }
+}
+
+/// What a proposal of a choice draws, once what stays is known.
+fn drawn_by(trace: &mut Trace, t: Target, seed: u64) -> Option<Work> {
+    let mut last = None;
+    for step in 0..TRIES {
+        let draws = Draws { key: StreamKey::new(seed, 0, Purpose::PREDICT), step, lane: 0 };
+        let before = work();
+        let done = trace.regenerate(&[t], draws).is_ok();
+        trace.rollback();
+        last = Some(work() - before).filter(|_| done).or(last);
+    }
+    last
+}
+
+/// An address without the keys in it.
+fn without_keys(address: &str) -> String {
+    let mut depth = 0;
+    address
+        .chars()
+        .filter(|c| {
+            depth += i32::from(*c == '[');
+            let inside = depth > 0;
+            depth -= i32::from(*c == ']');
+            !inside
+        })
+        .collect()
+}
+
+fn count(n: u64, what: &str) -> String {
+    let s = if n == 1 {
+        ""
+    } else if what.ends_with("sh") {
+        "es"
+    } else {
+        "s"
+    };
+    format!("{n} {what}{s}")
+}
+
+impl Explanation {
+    /// For people.
+    pub fn text(&self) -> String {
+        let total: usize = self.groups.iter().map(|g| g.choices).sum();
+        let mut text = format!("modelled: {}, compared with ", count(total as u64, "choice"));
+        text += &if self.observed.is_empty() { "nothing".into() } else { self.observed.join(", ") };
+        text += "\n\nproposed\n";
+        let row = |g: &Group| {
+            let alone = match g.alone {
+                [0, _] => "-".into(),
+                [n, accepted] => format!("{n}, {:.0}%", 100.0 * accepted as f64 / n as f64),
+            };
+            vec![format!("  {}", g.name), g.choices.to_string(), alone]
+        };
+        let head = ["  choices", "of them", "one at a time, accepted"].map(str::to_owned).to_vec();
+        text += &aligned(&std::iter::once(head).chain(self.groups.iter().map(row)).collect::<Vec<_>>());
+        let mut by: BTreeMap<&[String], Vec<&str>> = BTreeMap::new();
+        self.groups.iter().for_each(|g| by.entry(&g.kernels).or_default().push(&g.name));
+        for (kernels, names) in by {
+            let kernels =
+                if kernels.is_empty() { "no kernel: the plan names none of them".into() } else { kernels.join(", ") };
+            text += &wrapped(&format!("{} by {kernels}", names.join(", ")));
+        }
+        text += "\nredrawn, by one proposal of\n";
+        for g in &self.groups {
+            text += &wrapped(&format!("{}: {}", g.name, redrawn(g.drawn.as_ref())));
+        }
+        text += "\nskipped\n";
+        let skipped = self.skipped();
+        text += &if skipped.is_empty() {
+            "  nothing\n".into()
+        } else {
+            skipped.iter().map(|s| wrapped(s)).collect::<String>()
+        };
+        text
+    }
+
+    /// What was left out, and why.
+    fn skipped(&self) -> Vec<String> {
+        let absent = |[place, text]: &[String; 2]| {
+            format!("{place} `{text}`: not drawn, since nothing that is observed asks for it in this state")
+        };
+        let mut all: Vec<String> = self.absent.iter().map(absent).collect();
+        let most =
+            |of: fn(&Work) -> u64| self.groups.iter().filter_map(|g| g.drawn.as_ref().map(of)).max().unwrap_or(0);
+        let [closed, outside, hidden] = [most(|w| w.closed), most(|w| w.outside), most(|w| w.hidden)];
+        if closed > 0 {
+            all.push("backs of closed bodies: their fronts hide them".into());
+        }
+        if outside > 0 {
+            all.push(format!("{}: outside of the picture", count(outside, "mesh")));
+        }
+        if hidden > 0 {
+            all.push(format!("{}: wholly behind what stands still", count(hidden, "mesh")));
+        }
+        all
+    }
+
+    /// For programs.
+    pub fn json(&self) -> Value {
+        let drawn = |w: &Work| {
+            json!({
+                "pictures_whole": w.whole, "pictures_in_part": w.partial, "meshes_drawn": w.drawn,
+                "meshes_kept": w.kept, "meshes_outside": w.outside, "meshes_hidden": w.hidden,
+                "triangles": w.triangles, "triangles_of_closed_bodies": w.closed, "pixels": w.pixels,
+            })
+        };
+        let group = |g: &Group| {
+            json!({
+                "address": g.name, "choices": g.choices, "kernels": g.kernels, "proposals": g.alone[0],
+                "accepted": g.alone[1], "one_proposal_draws": g.drawn.as_ref().map(drawn),
+            })
+        };
+        json!({
+            "observed": self.observed,
+            "choices": self.groups.iter().map(group).collect::<Vec<_>>(),
+            "skipped": self.skipped(),
+        })
+    }
+}
+
+/// What one proposal drew, in words.
+fn redrawn(w: Option<&Work>) -> String {
+    let Some(w) = w else { return "impossible in this state".into() };
+    let pictures = w.whole + w.partial;
+    if pictures == 0 {
+        return "no picture".into();
+    }
+    let mut s = format!("{} drawn ({})", count(w.drawn, "mesh"), count(w.triangles, "triangle"));
+    s += &format!(", {} kept", w.kept);
+    s += &match (w.whole, w.partial) {
+        (0, _) => format!(", in part of the picture ({})", count(w.pixels, "pixel")),
+        (n, 0) => format!(", {} drawn at once", count(n, "picture")),
+        (n, m) => format!(", {} drawn at once, {m} in part", count(n, "picture")),
+    };
+    s
+}
+
+/// A paragraph, indented, in lines that fit.
+fn wrapped(text: &str) -> String {
+    let (mut out, mut line) = (String::new(), String::from(" "));
+    for word in text.split(' ') {
+        if line.chars().count() + 1 + word.chars().count() > COLUMNS && line.trim() != "" {
+            out += &line;
+            out.push('\n');
+            line = "   ".into();
+        }
+        line.push(' ');
+        line += word;
+    }
+    out + &line + "\n"
+}

@@ -1,0 +1,103 @@
+//! What a plan says of a model's choices: which of its kernels select them. Nothing is run.
+
+use super::expr::Scope;
+use super::plan::call;
+use super::selection::{selector, target};
+use crate::lang::code::Code;
+use crate::platform::clock::Instant;
+use crate::syntax::ast::{Expr, ExprKind, KStmt, KStmtKind};
+use crate::syntax::print_expr;
+use crate::trace::{Draws, Selector, Trace};
+use std::sync::Arc;
+
+/// A kernel of a plan.
+#[derive(Clone, Debug)]
+pub struct Selecting {
+    /// As it is written.
+    pub kernel: String,
+    /// What it may move; where that depends on variables of the plan, everything.
+    pub selector: Selector,
+}
+
+/// The kernels of a plan, those of warm-up too, each once, in the order of the plan.
+pub fn selecting(code: &Arc<Code>, plan: &[KStmt], trace: &mut Trace) -> Vec<Selecting> {
+    let mut found = Vec::new();
+    let env =
+        Scope { code, trace, variables: &[], draws: Draws::default(), started: Instant::now(), steps: 0, moved: None };
+    Reader { code, env, found: &mut found, within: Vec::new() }.statements(plan);
+    found
+}
+
+struct Reader<'a, 'e> {
+    code: &'a Code,
+    env: Scope<'e>,
+    found: &'a mut Vec<Selecting>,
+    /// Declared kernels being read: one may call itself.
+    within: Vec<Arc<str>>,
+}
+
+impl Reader<'_, '_> {
+    fn statements(&mut self, all: &[KStmt]) {
+        for statement in all {
+            match &statement.kind {
+                KStmtKind::Warmup { body, .. }
+                | KStmtKind::Repeat { body, .. }
+                | KStmtKind::Every { body, .. }
+                | KStmtKind::For { body, .. } => self.statements(body),
+                KStmtKind::Mix(arms) => arms.iter().for_each(|arm| self.kernel(&arm.kernel)),
+                KStmtKind::Expr(e) => self.kernel(e),
+                _ => {}
+            }
+        }
+    }
+
+    fn kernel(&mut self, e: &Expr) {
+        let Some((name, args)) = call(e) else { return };
+        if matches!(name, "init" | "anneal") {
+            return;
+        }
+        if let Some(declared) = self.code.kernels.iter().find(|k| *k.name.node == *name) {
+            if self.within.contains(&declared.name.node) {
+                return;
+            }
+            self.within.push(declared.name.node.clone());
+            let moved = declared.body.iter().filter_map(|s| match &s.kind {
+                KStmtKind::Propose { target, .. } | KStmtKind::Map { target, .. } => Some(target),
+                _ => None,
+            });
+            for target in moved.filter(|t| matches!(t.kind, ExprKind::Address(_))) {
+                let selector = selector(target, &mut self.env).unwrap_or(Selector::All);
+                self.add(print_expr(e), selector);
+            }
+            self.statements(&declared.body);
+            self.within.pop();
+            return;
+        }
+        // Kernels without a selection move everything; those that hold others, what these do.
+        let mut selected = false;
+        for arg in args {
+            let inside = call(&arg.value)
+                .is_some_and(|(inner, args)| !matches!(inner, "one" | "each") && args.iter().any(|a| target(&a.value)));
+            if inside {
+                selected = true;
+                self.kernel(&arg.value);
+            } else if target(&arg.value) {
+                selected = true;
+                let all = call(&arg.value).and_then(|(_, args)| args.first()).map_or(&arg.value, |a| &a.value);
+                let selector = selector(all, &mut self.env).unwrap_or(Selector::All);
+                self.add(print_expr(e), selector);
+            }
+        }
+        if !selected {
+            self.add(print_expr(e), Selector::All);
+        }
+    }
+
+    fn add(&mut self, kernel: String, selector: Selector) {
+        match self.found.iter_mut().find(|k| k.kernel == kernel) {
+            Some(k) if k.selector == selector => {}
+            Some(k) => k.selector = Selector::Union(Box::new(k.selector.clone()), Box::new(selector)),
+            None => self.found.push(Selecting { kernel, selector }),
+        }
+    }
+}

@@ -1,0 +1,419 @@
+//! Contours of a scene most of which stands still. The meshes that have not moved make a **backdrop**: its depth, and its pieces of contour
+//! that it does not hide itself, by the pixels that they look at. When one of the others moves, depth is composed anew where it was and is, and only the
+//! pieces that look there are looked at again; what came and went is told as a [`Change`]. So a picture costs what moves, not what is in it.
+//!
+//! Invariant: as for [`super::layers`], contours are those drawn at once, bit for bit. That rests on looks being monotone: what another mesh
+//! or a smaller depth range hides stays hidden with both, in `f64` too.
+
+mod mover;
+mod still;
+
+use self::mover::{Mover, Tools};
+use self::still::{Live, Still};
+use super::contours::Contours;
+use super::layers::{Layer, affine_bits, camera_bits};
+use super::raster::Area;
+use super::simd::vectorised;
+use super::visibility::Depths;
+use super::{Camera, work};
+use crate::geom::{Instance, Mesh, MeshesMark, Solid};
+use std::cell::RefCell;
+use std::sync::{Arc, Weak};
+
+/// A solid of fewer meshes is drawn at once: each is likely to have moved.
+const FEWEST: usize = 3;
+
+/// Memory of a backdrop, in pieces; a scene of more is drawn at once.
+const MOST_PIECES: usize = 1 << 19;
+
+/// How many drawings later a scene of which most moved is looked at again.
+const PATIENCE: u32 = 1024;
+
+/// A drawing's contours: those of what moves, and what the rest have more and less than in the drawing before, by the same thread in the same picture.
+#[derive(Debug)]
+pub struct Change {
+    /// Stands for the contours before; another one, that nobody has, where everything came.
+    pub from: Arc<()>,
+    /// Stands for the contours now.
+    pub to: Arc<()>,
+    /// Pieces of what stands still that are no longer seen.
+    pub gone: Contours,
+    /// Pieces of what stands still that were not seen before.
+    pub come: Contours,
+    /// All pieces that are seen of what moves.
+    pub moving: Contours,
+    /// How many pieces are seen now.
+    pub count: usize,
+}
+
+/// A mesh of the solid, as it was drawn last.
+struct Leaf {
+    mesh: Weak<Mesh>,
+    affine: [u64; 12],
+    moves: bool,
+}
+
+/// A list of meshes of the solid that was drawn last, and the number of its first one.
+struct Known {
+    list: MeshesMark,
+    first: usize,
+    count: usize,
+}
+
+/// A scene in the picture of one camera.
+pub(super) struct Backdrop {
+    camera: [u64; 17],
+    lists: Vec<Known>,
+    leaves: Vec<Leaf>,
+    movers: Vec<Mover>,
+    still: Option<Still>,
+    depth: Vec<f32>,
+    extent: f64,
+    /// Drawings since most of it moved.
+    waited: u32,
+    at: Arc<()>,
+    /// How many pieces are seen of what stands still, and of all.
+    shown: usize,
+    count: usize,
+    // Kept for their memory.
+    scratch: Layer,
+    rows: Vec<f32>,
+    pixels: Vec<u32>,
+    areas: Vec<Area>,
+}
+
+/// A thread's scenes, the one drawn last in front.
+#[derive(Default)]
+struct Backdrops {
+    scenes: Vec<Backdrop>,
+    tools: Tools,
+}
+
+/// Pictures that a thread keeps a scene of: several cameras, or several sizes.
+const PICTURES: usize = 4;
+
+thread_local! {
+    static BACKDROPS: RefCell<Backdrops> = RefCell::default();
+}
+
+/// The contours of a solid most of which stands still, and with them what has changed; `None` for one that is better drawn in another way.
+pub(super) fn contours(solid: &Solid, camera: &Camera) -> Option<Contours> {
+    with_scene(solid, camera, |scene, tools| scene.draw(solid, camera, tools).map(|_| scene.contours(camera)))
+}
+
+/// As [`contours`], only what has changed.
+pub(super) fn change(solid: &Solid, camera: &Camera) -> Option<Change> {
+    with_scene(solid, camera, |scene, tools| scene.draw(solid, camera, tools))
+}
+
+/// Works on the scene in a camera's picture.
+fn with_scene<T>(
+    solid: &Solid,
+    camera: &Camera,
+    work: impl FnOnce(&mut Backdrop, &mut Tools) -> Option<T>,
+) -> Option<T> {
+    if solid.mesh_count() < FEWEST {
+        return None;
+    }
+    BACKDROPS.with(|all| {
+        let mut all = all.try_borrow_mut().ok()?;
+        let Backdrops { scenes, tools } = &mut *all;
+        let eye = camera_bits(camera);
+        match scenes.iter().position(|scene| scene.camera == eye) {
+            Some(at) => scenes[..=at].rotate_right(1),
+            None => {
+                scenes.truncate(PICTURES - 1);
+                scenes.insert(0, Backdrop::new(camera));
+            }
+        }
+        work(scenes.first_mut()?, tools)
+    })
+}
+
+impl Backdrop {
+    /// Nothing drawn yet.
+    pub fn new(camera: &Camera) -> Backdrop {
+        Backdrop {
+            camera: camera_bits(camera),
+            lists: Vec::new(),
+            leaves: Vec::new(),
+            movers: Vec::new(),
+            still: None,
+            depth: Vec::new(),
+            extent: 0.0,
+            waited: 0,
+            at: Arc::default(),
+            shown: 0,
+            count: 0,
+            scratch: Layer::default(),
+            rows: Vec::new(),
+            pixels: Vec::new(),
+            areas: Vec::new(),
+        }
+    }
+
+    /// Brings it up to date; `None` for solids that are better drawn in another way: of few meshes, or most of which have moved.
+    pub fn draw(&mut self, solid: &Solid, camera: &Camera, tools: &mut Tools) -> Option<Change> {
+        let count = solid.mesh_count();
+        let changed = self.find_changed(solid);
+        if 2 * changed.len() > count {
+            self.forget();
+            return None;
+        }
+        for (leaf, _) in &changed {
+            if !std::mem::replace(&mut self.leaves[*leaf].moves, true) {
+                let at = self.movers.partition_point(|m| m.leaf < *leaf);
+                self.movers.insert(at, Mover::new(*leaf));
+                self.still = None;
+            }
+        }
+        if 2 * self.movers.len() > count {
+            self.still = None;
+            self.waited += 1;
+            if self.waited > PATIENCE {
+                self.forget();
+            }
+            return None;
+        }
+        self.waited = 0;
+        let known = self.still.is_some();
+        if !known {
+            self.build(solid, camera, tools)?;
+        }
+        self.areas.clear();
+        for (leaf, instance) in &changed {
+            let Some(mover) = self.movers.iter_mut().find(|m| m.leaf == *leaf) else { continue };
+            self.areas.push(mover.now.layer.area);
+            mover.move_to(instance, camera, tools, self.still.as_ref().filter(|_| known));
+            self.areas.push(mover.now.layer.area);
+        }
+        if !changed.is_empty() {
+            work::count(|work| work.kept += (count - changed.len()) as u64);
+        }
+        let still = self.still.as_mut()?;
+        let range = self.movers.iter().fold(still.range, |range, m| range.and(&m.now.layer.range));
+        let (extent, before) = (range.extent(), self.extent);
+        self.extent = extent;
+        if known && still.holds(extent) {
+            let moved = |m: &Mover| changed.iter().any(|(leaf, _)| *leaf == m.leaf);
+            return self.step(camera, before.to_bits() == extent.to_bits(), moved);
+        }
+        still.settle(camera, extent, known)?;
+        if self.movers.iter().any(|m| m.now.hidden) {
+            // What was hidden need not be so with another depth range.
+            let mut movers = self.movers.iter_mut().peekable();
+            for (leaf, instance) in solid.lists().flat_map(|list| list.iter()).enumerate() {
+                if let Some(mover) = movers.next_if(|m| m.leaf == leaf) {
+                    mover.move_to(instance, camera, tools, None);
+                }
+            }
+        }
+        self.begin(camera)
+    }
+
+    /// The contours that it shows.
+    pub fn contours(&self, camera: &Camera) -> Contours {
+        let mut out = Contours::with_room(camera, self.count);
+        let mut movers = self.movers.iter().peekable();
+        for live in self.still.iter().flat_map(|still| &still.live).filter(|live| live.shown) {
+            while let Some(mover) = movers.next_if(|m| m.leaf < live.leaf) {
+                out.append(&mover.seen);
+            }
+            out.push(&live.piece);
+        }
+        movers.for_each(|mover| out.append(&mover.seen));
+        out
+    }
+
+    /// Forgets what has moved.
+    fn forget(&mut self) {
+        self.movers.clear();
+        self.leaves.iter_mut().for_each(|leaf| leaf.moves = false);
+        (self.still, self.waited) = (None, 0);
+    }
+
+    /// The meshes that are not as they were drawn last; what is known of the solid becomes that of this one.
+    fn find_changed<'a>(&mut self, solid: &'a Solid) -> Vec<(usize, &'a Instance)> {
+        let (mut changed, mut first, mut lists) = (Vec::new(), 0, 0);
+        for meshes in solid.lists() {
+            let known = self.lists.get(lists).filter(|known| known.first == first && meshes.is(&known.list));
+            if let Some(known) = known {
+                first += known.count;
+                lists += 1;
+                continue;
+            }
+            let now = Known { list: meshes.mark(), first, count: meshes.len() };
+            for (leaf, instance) in (first..).zip(meshes.iter()) {
+                let affine = affine_bits(&instance.affine);
+                match self.leaves.get_mut(leaf) {
+                    Some(l) if l.affine == affine && std::ptr::eq(l.mesh.as_ptr(), Arc::as_ptr(&instance.mesh)) => {}
+                    Some(l) => {
+                        (l.mesh, l.affine) = (Arc::downgrade(&instance.mesh), affine);
+                        changed.push((leaf, instance));
+                    }
+                    None => {
+                        self.leaves.push(Leaf { mesh: Arc::downgrade(&instance.mesh), affine, moves: false });
+                        self.still = None;
+                        changed.push((leaf, instance));
+                    }
+                }
+            }
+            first += now.count;
+            match self.lists.get_mut(lists) {
+                Some(known) => *known = now,
+                None => self.lists.push(now),
+            }
+            lists += 1;
+        }
+        self.lists.truncate(lists);
+        if first < self.leaves.len() {
+            self.leaves.truncate(first);
+            self.movers.retain(|m| m.leaf < first);
+            self.still = None;
+        }
+        changed
+    }
+
+    /// Draws all meshes, those that stand still and the others.
+    fn build(&mut self, solid: &Solid, camera: &Camera, tools: &mut Tools) -> Option<()> {
+        let mut still = Still::new(camera);
+        let (whole, width) = (Area::whole(camera), camera.width as usize);
+        let mut movers = self.movers.iter_mut().peekable();
+        for (leaf, instance) in solid.lists().flat_map(|list| list.iter()).enumerate() {
+            if let Some(mover) = movers.next_if(|m| m.leaf == leaf) {
+                mover.move_to(instance, camera, tools, None);
+                continue;
+            }
+            let layer = &mut self.scratch;
+            let Tools { projected, candidates, room } = tools;
+            layer.draw(instance, camera, (projected, candidates), room, |_, _| false);
+            layer.show(&mut still.depth, width, &whole);
+            still.range = still.range.and(&layer.range);
+            still.pieces.extend(layer.pieces.iter().map(|piece| (*piece, leaf)));
+            if still.pieces.len() > MOST_PIECES {
+                return None;
+            }
+        }
+        self.still = Some(still);
+        Some(())
+    }
+
+    /// Composes the whole picture and looks at everything.
+    fn begin(&mut self, camera: &Camera) -> Option<Change> {
+        let Backdrop { still, movers, depth, extent, .. } = self;
+        let still = still.as_mut()?;
+        work::count(|work| {
+            work.partial += 1;
+            work.pixels += camera.pixels() as u64;
+        });
+        depth.clone_from(&still.depth);
+        movers.iter().for_each(|m| m.now.layer.show(depth, camera.width as usize, &Area::whole(camera)));
+        let depths = Depths::new(depth, camera.width, camera.height, *extent)?;
+        self.shown = 0;
+        for live in &mut still.live {
+            live.shown = depths.visible(&live.piece);
+            self.shown += usize::from(live.shown);
+        }
+        movers.iter_mut().for_each(|mover| mover.look(&depths));
+        self.at = Arc::default();
+        let none = || Contours::with_room(camera, 0);
+        Some(self.change(camera, Arc::default(), [none(), none()]))
+    }
+
+    /// The change to what is there now.
+    fn change(&mut self, camera: &Camera, from: Arc<()>, [gone, come]: [Contours; 2]) -> Change {
+        let mut moving = Contours::with_room(camera, self.movers.iter().map(|m| m.seen.len()).sum());
+        self.movers.iter().for_each(|mover| moving.append(&mover.seen));
+        self.count = self.shown + moving.len();
+        Change { from, to: self.at.clone(), gone, come, moving, count: self.count }
+    }
+
+    /// Composes the picture where some have moved, and looks again where they were and are.
+    fn step(&mut self, camera: &Camera, same_extent: bool, moved: impl Fn(&Mover) -> bool) -> Option<Change> {
+        let anything = !same_extent || self.movers.iter().any(&moved);
+        let Backdrop { still, movers, depth, extent, rows, pixels, areas, .. } = self;
+        let (still, width) = (still.as_mut()?, camera.width as usize);
+        Area::join(areas);
+        work::count(|work| {
+            work.partial += u64::from(anything);
+            work.pixels += areas.iter().map(Area::pixels).sum::<usize>() as u64;
+        });
+        // Where something is so near that all looks of the backdrop end at it, a change means nothing.
+        let nearest = &still.nearest;
+        let still_hides = |at: usize, depth: f32| nearest.get(at).is_none_or(|nearest| f64::from(depth) < *nearest);
+        pixels.clear();
+        for area in &*areas {
+            let span = |row: usize| row * width + area.left..row * width + area.right;
+            rows.clear();
+            for row in area.top..area.bottom {
+                let (Some(there), Some(still)) = (depth.get_mut(span(row)), still.depth.get(span(row))) else {
+                    continue;
+                };
+                rows.extend_from_slice(there);
+                there.copy_from_slice(still);
+            }
+            vectorised(
+                #[inline(always)]
+                || movers.iter().for_each(|m| m.now.layer.show(depth, width, area)),
+            );
+            let mut before = rows.iter();
+            for at in (area.top..area.bottom).flat_map(span) {
+                let (Some(now), Some(still), Some(before)) = (depth.get(at), still.depth.get(at), before.next()) else {
+                    break;
+                };
+                // Where there is a mover, what is seen may also change with the depth range.
+                let hidden = still_hides(at, *now) && still_hides(at, *before);
+                if !hidden && (now != before || (!same_extent && now != still)) {
+                    pixels.push(at as u32);
+                }
+            }
+        }
+        if !same_extent {
+            for mover in movers.iter().filter(|m| !moved(m)) {
+                let area = mover.now.layer.area;
+                let all = (area.top..area.bottom).flat_map(|row| row * width + area.left..row * width + area.right);
+                let open = |at: &usize| match (depth.get(*at), still.depth.get(*at)) {
+                    (Some(now), Some(still)) => now != still && !still_hides(*at, *now),
+                    _ => false,
+                };
+                pixels.extend(all.filter(open).map(|at| at as u32));
+            }
+        }
+        let depths = Depths::new(depth, camera.width, camera.height, *extent)?;
+        let [mut gone, mut come] = [0; 2].map(|_| Contours::with_room(camera, 256));
+        let mut look = |live: &mut Live| {
+            let shown = depths.visible(&live.piece);
+            if shown != live.shown {
+                live.shown = shown;
+                if shown { &mut come } else { &mut gone }.push(&live.piece);
+            }
+        };
+        let Still { live, unsure, start, looks, .. } = still;
+        let unsure = if same_extent { &[][..] } else { &unsure[..] };
+        for pixel in &*pixels {
+            let ends = [*pixel as usize, *pixel as usize + 1].map(|i| start.get(i).map_or(0, |s| *s as usize));
+            for i in looks.get(ends[0]..ends[1]).unwrap_or_default() {
+                live.get_mut(*i as usize).into_iter().for_each(&mut look);
+            }
+        }
+        for i in unsure {
+            live.get_mut(*i as usize).into_iter().for_each(&mut look);
+        }
+        for mover in movers {
+            let (area, moved) = (mover.now.layer.looks, moved(mover));
+            if moved || !same_extent || areas.iter().any(|dirty| dirty.meets(&area)) {
+                mover.look(&depths);
+            }
+        }
+        self.shown = self.shown + come.len() - gone.len();
+        let from = self.at.clone();
+        if anything {
+            self.at = Arc::default();
+        }
+        Some(self.change(camera, from, [gone, come]))
+    }
+}
+
+#[cfg(test)]
+#[path = "backdrop_tests.rs"]
+mod tests;

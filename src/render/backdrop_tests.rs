@@ -1,0 +1,164 @@
+//! Backdrops against drawing everything at once, bit for bit, and what they leave undrawn.
+
+use super::*;
+use crate::geom::Affine;
+use crate::render::testing::{Uniform, cuboid, lathe, sphere};
+use glam::{DVec3, Vec3};
+
+/// A ball, a box, an open or a closed lathe.
+fn shape(random: &mut Uniform) -> Solid {
+    let profile = [(0.5, -0.8), (0.7, -0.1), (0.4, 0.6)];
+    match (random.next() * 4.0) as u32 {
+        0 => sphere(11, 7),
+        1 => cuboid(Vec3::new(0.4, 0.9, 0.3)),
+        2 => lathe(&profile, 9, false),
+        _ => lathe(&profile, 13, true),
+    }
+}
+
+fn somewhere(random: &mut Uniform, reach: f64, size: f64) -> Affine {
+    let mut at = |s: f64| DVec3::new(random.between(-s, s), random.between(-s, s), random.between(-s, s));
+    Affine::new(at(reach), at(2.0), DVec3::splat(size))
+}
+
+/// One picture and what a follower of its changes has counted.
+struct Followed {
+    backdrop: Backdrop,
+    tools: Tools,
+    at: Arc<()>,
+    /// The pieces now of what stands still, in some order, by their bits.
+    pieces: Vec<[u32; 5]>,
+}
+
+fn bits(c: &Contours) -> Vec<[u32; 5]> {
+    (0..c.len()).map(|i| [c.x[i], c.y[i], c.tx[i], c.ty[i], c.length[i]].map(f32::to_bits)).collect()
+}
+
+impl Followed {
+    fn new(camera: &Camera) -> Followed {
+        Followed { backdrop: Backdrop::new(camera), tools: Tools::default(), at: Arc::default(), pieces: Vec::new() }
+    }
+
+    /// Draws, and holds the picture and its change against everything drawn at once. Whether it was done by the backdrop, and by a change.
+    fn check(&mut self, solid: &Solid, camera: &Camera) -> [bool; 2] {
+        let Some(change) = self.backdrop.draw(solid, camera, &mut self.tools) else { return [false; 2] };
+        let (got, wanted) = (self.backdrop.contours(camera), Contours::drawn(solid, camera));
+        assert_eq!(bits(&got), bits(&wanted));
+        assert_eq!(change.count, wanted.len());
+        let follows = Arc::ptr_eq(&self.at, &change.from);
+        if follows {
+            for gone in bits(&change.gone) {
+                let at = self.pieces.iter().position(|p| *p == gone).expect("what goes was there");
+                self.pieces.swap_remove(at);
+            }
+            self.pieces.extend(bits(&change.come));
+        } else {
+            let moving = bits(&change.moving);
+            self.pieces = bits(&got);
+            for piece in moving {
+                let at = self.pieces.iter().position(|p| *p == piece).expect("what moves is there");
+                self.pieces.swap_remove(at);
+            }
+        }
+        let mut sorted = [[&self.pieces[..], &bits(&change.moving)].concat(), bits(&wanted)];
+        sorted.iter_mut().for_each(|pieces| pieces.sort_unstable());
+        assert_eq!(sorted[0], sorted[1]);
+        self.at = change.to;
+        [true, follows]
+    }
+}
+
+#[test]
+fn backdrops_give_what_is_drawn_at_once() {
+    let mut random = Uniform(31);
+    let (mut drawn, mut followed) = (0, 0);
+    for round in 0..8 {
+        let mut camera = Camera::default_for(60 + 7 * round, 96 - 5 * round);
+        if round % 3 == 1 {
+            let units_per_pixel = 0.05;
+            camera.projection = crate::render::Projection::Orthographic { units_per_pixel, cx: 30.0, cy: 40.0 };
+        } else if round % 3 == 2 {
+            // The near plane cuts some.
+            camera.eye.z = 1.4;
+        }
+        let count = 4 + 6 * round as usize;
+        let mut solids: Vec<Solid> =
+            (0..count).map(|_| shape(&mut random).placed(somewhere(&mut random, 1.2, 0.25))).collect();
+        let moving = 1 + round as usize % 3;
+        let shapes: Vec<Solid> = (0..moving).map(|_| shape(&mut random)).collect();
+        let mut followers = Followed::new(&camera);
+        for step in 0..60 {
+            let before = solids.clone();
+            // Far, near, and out of the picture; now and then something else moves, too.
+            let (k, reach) = ((random.next() * moving as f64) as usize, [0.05, 0.8, 3.0][step % 3]);
+            solids[k] = shapes[k].placed(somewhere(&mut random, reach, 0.5));
+            if step % 20 == 19 {
+                solids[count - 1] = shape(&mut random).placed(somewhere(&mut random, 1.0, 0.3));
+            }
+            let (front, rest) = solids.split_at(moving);
+            let nested = [front, &[Solid::group(rest)]].concat();
+            let solid = if step % 2 == 0 { Solid::group(&solids) } else { Solid::group(&nested) };
+            let [by_backdrop, follows] = followers.check(&solid, &camera);
+            drawn += usize::from(by_backdrop);
+            followed += usize::from(follows);
+            if random.next() < 0.5 {
+                solids = before;
+            }
+        }
+    }
+    assert!(drawn > 400 && followed > 250, "{drawn} {followed}");
+}
+
+#[test]
+fn a_scene_that_changes_altogether_is_drawn_in_another_way() {
+    let mut random = Uniform(32);
+    let camera = Camera::default_for(48, 48);
+    let mut scene = |count: usize| -> Vec<Solid> {
+        (0..count).map(|_| shape(&mut random).placed(somewhere(&mut random, 1.0, 0.3))).collect()
+    };
+    let mut followed = Followed::new(&camera);
+    for count in [10, 10, 7, 12, 2] {
+        assert!(!followed.check(&Solid::group(&scene(count)), &camera)[0] || count == 2);
+    }
+    let fixed = scene(8);
+    followed.check(&Solid::group(&fixed), &camera);
+    assert!(followed.check(&Solid::group(&fixed), &camera)[0], "nothing has moved");
+    assert!(!followed.check(&Solid::group(&scene(8)), &camera)[0]);
+}
+
+#[test]
+fn what_is_outside_or_behind_costs_no_drawing() {
+    let camera = Camera::default_for(64, 64);
+    let at = |x: f64, z: f64| Affine::new(DVec3::new(x, 0.0, z), DVec3::ZERO, DVec3::splat(0.4));
+    let wall = cuboid(Vec3::new(3.0, 3.0, 0.2));
+    let floor = cuboid(Vec3::new(0.2, 0.2, 4.0)).placed(Affine::new(DVec3::Y, DVec3::ZERO, DVec3::ONE));
+    let fixed = Solid::group(&[wall, floor.clone(), floor]);
+    let ball = sphere(16, 9);
+    let mut followed = Followed::new(&camera);
+    let mut took = |place: Affine| {
+        let solid = Solid::group(&[fixed.clone(), ball.placed(place)]);
+        let before = work::work();
+        let change = followed.backdrop.draw(&solid, &camera, &mut followed.tools);
+        let spent = work::work() - before;
+        if change.is_some() {
+            assert_eq!(bits(&followed.backdrop.contours(&camera)), bits(&Contours::drawn(&solid, &camera)));
+        }
+        spent
+    };
+    for x in [0.0, 0.1, 0.2] {
+        took(at(x, 1.0));
+    }
+    let seen = took(at(0.3, 1.0));
+    assert_eq!((seen.drawn, seen.outside, seen.hidden, seen.kept), (1, 0, 0, 3));
+    let outside = took(at(9.0, 1.0));
+    assert_eq!((outside.drawn, outside.outside, outside.hidden), (0, 1, 0));
+    let behind = took(at(0.0, -1.5));
+    assert_eq!((behind.drawn, behind.outside, behind.hidden), (0, 0, 1));
+    // It comes out again, and is there.
+    assert_eq!(took(at(0.0, 1.0)).drawn, 1);
+    // Drawn at once, too, nothing is drawn of what is outside.
+    let before = work::work();
+    let lonely = Contours::drawn(&ball.placed(at(9.0, 1.0)), &camera);
+    let spent = work::work() - before;
+    assert_eq!((lonely.len(), spent.drawn, spent.outside), (0, 0, 1));
+}
