@@ -38,7 +38,8 @@ pub fn plot(rows: &[Row], error: &str, named: &[(String, String)]) -> String {
     let seconds = || shown.iter().map(|r| r.seconds.log10());
     let (low, high) = (seconds().fold(f64::INFINITY, f64::min), seconds().fold(f64::NEG_INFINITY, f64::max));
     let (low, high) = if low < high { (low - 0.05, high + 0.05) } else { (-1.0, 1.0) };
-    let top = shown.iter().map(|r| if r.high.is_finite() { r.high } else { r.error }).fold(1e-9, f64::max) * 1.02;
+    let most = shown.iter().map(|r| if r.high.is_finite() { r.high } else { r.error }).fold(1e-9, f64::max);
+    let top = (most * 1.02).min(f64::MAX);
     let axes = Axes { time: (low, high), top };
     let mut s = format!(
         "<svg xmlns=\"http://www.w3.org/2000/svg\" viewBox=\"0 0 {WIDTH} {HEIGHT}\" width=\"{WIDTH}\" height=\"{HEIGHT}\" \
@@ -121,7 +122,7 @@ fn grid(s: &mut String, axes: &Axes, error: &str) {
         let y = axes.y(e);
         let _ = write!(s, "<path d=\"M{LEFT},{y:.1}H{}\" stroke=\"#eee\"/>", WIDTH - EDGE);
         // Not 0.30000000000000004.
-        let e = (e * 1e9).round() / 1e9;
+        let e = if e < 1e6 { (e * 1e9).round() / 1e9 } else { e };
         let (x, y) = (LEFT - 6.0, y + 4.0);
         let _ = writeln!(s, "<text x=\"{x}\" y=\"{y:.1}\" text-anchor=\"end\" fill=\"#555\">{e}</text>");
     }

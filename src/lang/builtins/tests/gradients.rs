@@ -10,8 +10,11 @@ use glam::DVec3;
 use std::collections::HashSet;
 
 /// Functions without a derivative, and why.
-const NONE: &[(&str, &str)] =
-    &[("scene.autorig", "joints are found by search"), ("scene.camera", "cameras are not differentiated")];
+const NONE: &[(&str, &str)] = &[
+    ("scene.autorig", "joints are found by search"),
+    ("scene.camera", "cameras are not differentiated"),
+    ("scene.edges", "contours are found in a photograph, which nothing moves"),
+];
 
 /// Functions compared with differences elsewhere: in `tests/gradient.rs`, and beside the comparators and renderers.
 const ELSEWHERE: &[&str] = &[
