@@ -4,6 +4,7 @@ use super::{IMAGE, native};
 use crate::lang::builtins::scene::ImageValue;
 use crate::lang::builtins::{Row, Type, arg, opt};
 use crate::lang::error::Fault;
+use crate::lang::value::Value;
 use crate::vision::GradientDetector;
 
 pub(super) const TABLE: &[Row] = &[native(
@@ -29,6 +30,10 @@ pub(super) const TABLE: &[Row] = &[native(
     IMAGE,
     "The photograph with its contours found by these settings, for comparators. Of one photograph and one setting they are found once.",
     |a| {
+        // A photograph that is not given, where a program is looked at without one.
+        if matches!(a.values[0], Value::Unit) {
+            return Ok(Value::Unit);
+        }
         let image = a.object::<ImageValue>(0, "an image")?;
         let by = GradientDetector::default();
         let size = if a.given(1) { a.int_in(1, 8, 8192)? as u32 } else { by.size };
@@ -50,7 +55,6 @@ pub(super) const TABLE: &[Row] = &[native(
 #[cfg(test)]
 mod tests {
     use super::*;
-    use crate::lang::value::Value;
     use crate::vision::{ContourMap, Photo};
 
     fn edges(image: &Value, more: &[f64]) -> Result<Value, Fault> {
@@ -77,5 +81,6 @@ mod tests {
         assert!(edges(&photo, &[4.0]).is_err() && edges(&photo, &[64.0, f64::NAN]).is_err());
         let map = Value::object(ImageValue::contours(ContourMap::new(9, 9), None));
         assert_eq!(count(&edges(&map, &[]).unwrap()), 0);
+        assert!(matches!(edges(&Value::Unit, &[]), Ok(Value::Unit)));
     }
 }
