@@ -251,7 +251,8 @@ fn depths_masks_and_keypoints_score_anything() {
 #[test]
 fn photographs_of_one_colour_and_of_noise_are_read() {
     let mut points = Points::of("photographs");
-    let pictures: [(&str, u32, u32, &dyn Fn(u32, u32) -> u8); 6] = [
+    type Colour<'a> = &'a dyn Fn(u32, u32) -> u8;
+    let pictures: [(&str, u32, u32, Colour); 6] = [
         ("black", 64, 48, &|_, _| 0),
         ("white", 64, 48, &|_, _| 255),
         ("one pixel", 1, 1, &|_, _| 128),
