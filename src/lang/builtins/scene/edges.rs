@@ -31,7 +31,7 @@ pub(super) const TABLE: &[Row] = &[native(
     "The photograph with its contours found by these settings, for comparators. Of one photograph and one setting they are found once.",
     |a| {
         // A photograph that is not given, where a program is looked at without one.
-        if matches!(a.values[0], Value::Unit) {
+        if matches!(a.values.first(), Some(Value::Unit)) {
             return Ok(Value::Unit);
         }
         let image = a.object::<ImageValue>(0, "an image")?;
@@ -48,7 +48,7 @@ pub(super) const TABLE: &[Row] = &[native(
         image
             .detected_by(GradientDetector { size, sigma: sigma as f32, ..by }, strength as f32)
             .map_err(Fault::domain)
-            .map(|found| found.unwrap_or_else(|| a.values[0].clone()))
+            .map(|found| found.unwrap_or_else(|| a.get(0).clone()))
     },
 )];
 
