@@ -134,88 +134,92 @@ fn on_a_terminal() {
         spawn_with_options(c, Options::new().timeout_ms(Some(60_000))).unwrap()
     };
     let mut p = start(&[]);
-    let prompt = "pcad> ";
+    // A prompt is drawn anew with every key; a new one comes where the terminal is told to mark what is pasted. What is typed before is lost.
+    let ready = |p: &mut PtySession| {
+        p.exp_string("\u{1b}[?2004h").unwrap();
+        p.exp_string("pcad> ").unwrap();
+    };
     p.exp_string(":help lists the commands").unwrap();
-    p.exp_string(prompt).unwrap();
+    ready(&mut p);
     // A directive, in colours, and its value.
     p.send_line("assume height ~ normal(0, 1)").unwrap();
     p.exp_string("\u{1b}[1;35massume\u{1b}[0m").unwrap();
     p.exp_string("height = ").unwrap();
-    p.exp_string(prompt).unwrap();
+    ready(&mut p);
     // Tab.
     p.send("hei\t + 0 * hei\t").unwrap();
     p.send_line("").unwrap();
     p.exp_regex(r"\r\n-?[0-9.]+\r\n").unwrap();
-    p.exp_string(prompt).unwrap();
+    ready(&mut p);
     p.send(":flip @hei\t").unwrap();
     p.send_line("").unwrap();
     p.exp_string("accepted").unwrap();
-    p.exp_string(prompt).unwrap();
+    ready(&mut p);
     // Several lines.
     p.send_line("fn twice(x) {").unwrap();
     p.send_line("  2 * x").unwrap();
     p.send_line("}").unwrap();
-    p.exp_string(prompt).unwrap();
+    ready(&mut p);
     p.send_line("twice(21)").unwrap();
     p.exp_string("\r\n42\r\n").unwrap();
-    p.exp_string(prompt).unwrap();
+    ready(&mut p);
     // Ctrl-C clears the line; an error leaves the session.
     p.send("twice(1 + ").unwrap();
     p.send_control('c').unwrap();
-    p.exp_string(prompt).unwrap();
+    ready(&mut p);
     p.send_line("twise(1)").unwrap();
     p.exp_string("did you mean `twice`?").unwrap();
-    p.exp_string(prompt).unwrap();
+    ready(&mut p);
     // History: the last but one.
     p.send("\u{1b}[A\u{1b}[A").unwrap();
     p.send_line("").unwrap();
     p.exp_string("\r\n42\r\n").unwrap();
-    p.exp_string(prompt).unwrap();
+    ready(&mut p);
     // Ctrl-C during inference: everything is as it was.
     p.send_line(":set @height 0.25").unwrap();
     p.exp_string("log joint").unwrap();
-    p.exp_string(prompt).unwrap();
+    ready(&mut p);
     p.send_line(":infer mh(@height) 100000000000").unwrap();
     p.exp_string("Ctrl-C ends it").unwrap();
     p.send_control('c').unwrap();
     p.exp_string("stopped; everything is as it was").unwrap();
-    p.exp_string(prompt).unwrap();
+    ready(&mut p);
     p.send_line("height").unwrap();
     p.exp_string("\r\n0.25\r\n").unwrap();
-    p.exp_string(prompt).unwrap();
+    ready(&mut p);
     // In the background.
     p.send_line(":infer mh(@height) 100000000000 &").unwrap();
     p.exp_string("run 2 in the background").unwrap();
-    p.exp_string(prompt).unwrap();
+    ready(&mut p);
     p.send_control('d').unwrap();
     p.exp_string("run 2 would be lost").unwrap();
-    p.exp_string(prompt).unwrap();
+    ready(&mut p);
     p.send_line("twice(height)").unwrap();
     p.exp_string("\r\n0.5\r\n").unwrap();
-    p.exp_string(prompt).unwrap();
+    ready(&mut p);
     p.send_line(":stop").unwrap();
     p.exp_string("run 2 is the state now").unwrap();
-    p.exp_string(prompt).unwrap();
+    ready(&mut p);
     // A picture in half blocks.
     p.send_line("include \"std/scene.pcad\" as scene").unwrap();
-    p.exp_string(prompt).unwrap();
+    ready(&mut p);
     p.send_line("let ball = scene.sphere(1)").unwrap();
     p.exp_string("a solid").unwrap();
-    p.exp_string(prompt).unwrap();
+    ready(&mut p);
     p.send_line(":render").unwrap();
     p.exp_regex("\u{1b}\\[38;2;[0-9]+;[0-9]+;[0-9]+;48;2;").unwrap();
-    p.exp_string(prompt).unwrap();
+    ready(&mut p);
     p.send_control('d').unwrap();
     p.exp_eof().unwrap();
 
     // The history is there the next time.
     assert!(f.read("state/pcadlang/history").contains("twice(21)"));
     let mut p = start(&["coin.pcad"]);
-    p.exp_string(prompt).unwrap();
+    ready(&mut p);
     p.send("\u{1b}[A").unwrap();
     p.send_line("").unwrap();
     p.exp_string("no view").unwrap();
-    p.exp_string(prompt).unwrap();
+    ready(&mut p);
     p.send_line(":quit").unwrap();
     p.exp_eof().unwrap();
 }
