@@ -9,9 +9,9 @@ mod mover;
 mod still;
 
 use self::mover::{Mover, Tools};
-use self::still::{Live, Still};
+use self::still::Still;
 use super::contours::Contours;
-use super::layers::{Layer, affine_bits, camera_bits};
+use super::layers::{Layer, Sight, affine_bits, camera_bits};
 use super::raster::Area;
 use super::simd::vectorised;
 use super::visibility::Depths;
@@ -80,6 +80,10 @@ pub(super) struct Backdrop {
     rows: Vec<f32>,
     pixels: Vec<u32>,
     areas: Vec<Area>,
+    /// By pixel of an area: whether looks there are to be made again.
+    again: Vec<u8>,
+    /// How many meshes there were when there were too many pieces.
+    refused: Option<usize>,
 }
 
 /// A thread's scenes, the one drawn last in front.
@@ -149,6 +153,8 @@ impl Backdrop {
             rows: Vec::new(),
             pixels: Vec::new(),
             areas: Vec::new(),
+            again: Vec::new(),
+            refused: None,
         }
     }
 
@@ -156,6 +162,10 @@ impl Backdrop {
     pub fn draw(&mut self, solid: &Solid, camera: &Camera, tools: &mut Tools) -> Option<Change> {
         let count = solid.mesh_count();
         let changed = self.find_changed(solid);
+        if self.still.is_none() && changed.is_empty() {
+            // The same solid again, which was better drawn in another way.
+            return None;
+        }
         if 2 * changed.len() > count {
             self.forget();
             return None;
@@ -177,17 +187,19 @@ impl Backdrop {
         }
         self.waited = 0;
         let known = self.still.is_some();
-        if !known {
-            self.build(solid, camera, tools)?;
+        if !known && (self.refused == Some(count) || self.build(solid, camera, tools).is_none()) {
+            self.refused = Some(count);
+            return None;
         }
         self.areas.clear();
+        let only = self.movers.len() == 1;
         for (leaf, instance) in &changed {
             let Some(mover) = self.movers.iter_mut().find(|m| m.leaf == *leaf) else { continue };
             self.areas.push(mover.now.layer.area);
-            mover.move_to(instance, camera, tools, self.still.as_ref().filter(|_| known));
+            mover.move_to(instance, camera, tools, self.still.as_ref().filter(|_| known), only);
             self.areas.push(mover.now.layer.area);
         }
-        if !changed.is_empty() {
+        if known && !changed.is_empty() {
             work::count(|work| work.kept += (count - changed.len()) as u64);
         }
         let still = self.still.as_mut()?;
@@ -196,15 +208,15 @@ impl Backdrop {
         self.extent = extent;
         if known && still.holds(extent) {
             let moved = |m: &Mover| changed.iter().any(|(leaf, _)| *leaf == m.leaf);
-            return self.step(camera, before.to_bits() == extent.to_bits(), moved);
+            return self.step(camera, [before, extent], moved);
         }
         still.settle(camera, extent, known)?;
-        if self.movers.iter().any(|m| m.now.hidden) {
-            // What was hidden need not be so with another depth range.
+        if self.movers.iter().any(|m| !m.now.is_whole()) {
+            // What was hidden, or did not matter, need not be so with another depth range.
             let mut movers = self.movers.iter_mut().peekable();
             for (leaf, instance) in solid.lists().flat_map(|list| list.iter()).enumerate() {
                 if let Some(mover) = movers.next_if(|m| m.leaf == leaf) {
-                    mover.move_to(instance, camera, tools, None);
+                    mover.move_to(instance, camera, tools, None, only);
                 }
             }
         }
@@ -215,11 +227,11 @@ impl Backdrop {
     pub fn contours(&self, camera: &Camera) -> Contours {
         let mut out = Contours::with_room(camera, self.count);
         let mut movers = self.movers.iter().peekable();
-        for live in self.still.iter().flat_map(|still| &still.live).filter(|live| live.shown) {
-            while let Some(mover) = movers.next_if(|m| m.leaf < live.leaf) {
+        for (piece, leaf) in self.still.iter().flat_map(Still::shown) {
+            while let Some(mover) = movers.next_if(|m| m.leaf < *leaf) {
                 out.append(&mover.seen);
             }
-            out.push(&live.piece);
+            out.push(piece);
         }
         movers.for_each(|mover| out.append(&mover.seen));
         out
@@ -229,7 +241,7 @@ impl Backdrop {
     fn forget(&mut self) {
         self.movers.clear();
         self.leaves.iter_mut().for_each(|leaf| leaf.moves = false);
-        (self.still, self.waited) = (None, 0);
+        (self.still, self.waited, self.refused) = (None, 0, None);
     }
 
     /// The meshes that are not as they were drawn last; what is known of the solid becomes that of this one.
@@ -281,12 +293,12 @@ impl Backdrop {
         let mut movers = self.movers.iter_mut().peekable();
         for (leaf, instance) in solid.lists().flat_map(|list| list.iter()).enumerate() {
             if let Some(mover) = movers.next_if(|m| m.leaf == leaf) {
-                mover.move_to(instance, camera, tools, None);
+                mover.move_to(instance, camera, tools, None, false);
                 continue;
             }
             let layer = &mut self.scratch;
             let Tools { projected, candidates, room } = tools;
-            layer.draw(instance, camera, (projected, candidates), room, |_, _| false);
+            layer.draw(instance, camera, (projected, candidates), room, |_, _| Sight::Whole);
             layer.show(&mut still.depth, width, &whole);
             still.range = still.range.and(&layer.range);
             still.pieces.extend(layer.pieces.iter().map(|piece| (*piece, leaf)));
@@ -309,11 +321,7 @@ impl Backdrop {
         depth.clone_from(&still.depth);
         movers.iter().for_each(|m| m.now.layer.show(depth, camera.width as usize, &Area::whole(camera)));
         let depths = Depths::new(depth, camera.width, camera.height, *extent)?;
-        self.shown = 0;
-        for live in &mut still.live {
-            live.shown = depths.visible(&live.piece);
-            self.shown += usize::from(live.shown);
-        }
+        self.shown = still.look_at_all(&depths);
         movers.iter_mut().for_each(|mover| mover.look(&depths));
         self.at = Arc::default();
         let none = || Contours::with_room(camera, 0);
@@ -329,21 +337,20 @@ impl Backdrop {
     }
 
     /// Composes the picture where some have moved, and looks again where they were and are.
-    fn step(&mut self, camera: &Camera, same_extent: bool, moved: impl Fn(&Mover) -> bool) -> Option<Change> {
+    fn step(&mut self, camera: &Camera, extents: [f64; 2], moved: impl Fn(&Mover) -> bool) -> Option<Change> {
+        let same_extent = extents[0].to_bits() == extents[1].to_bits();
         let anything = !same_extent || self.movers.iter().any(&moved);
-        let Backdrop { still, movers, depth, extent, rows, pixels, areas, .. } = self;
+        let Backdrop { still, movers, depth, extent, rows, pixels, areas, again, .. } = self;
         let (still, width) = (still.as_mut()?, camera.width as usize);
         Area::join(areas);
         work::count(|work| {
             work.partial += u64::from(anything);
             work.pixels += areas.iter().map(Area::pixels).sum::<usize>() as u64;
         });
-        // Where something is so near that all looks of the backdrop end at it, a change means nothing.
-        let nearest = &still.nearest;
-        let still_hides = |at: usize, depth: f32| nearest.get(at).is_none_or(|nearest| f64::from(depth) < *nearest);
         pixels.clear();
         for area in &*areas {
-            let span = |row: usize| row * width + area.left..row * width + area.right;
+            let (columns, span) =
+                (area.right - area.left, |row: usize| row * width + area.left..row * width + area.right);
             rows.clear();
             for row in area.top..area.bottom {
                 let (Some(there), Some(still)) = (depth.get_mut(span(row)), still.depth.get(span(row))) else {
@@ -352,28 +359,39 @@ impl Backdrop {
                 rows.extend_from_slice(there);
                 there.copy_from_slice(still);
             }
+            again.clear();
+            again.resize(area.pixels(), 0);
             vectorised(
                 #[inline(always)]
-                || movers.iter().for_each(|m| m.now.layer.show(depth, width, area)),
+                || {
+                    movers.iter().for_each(|m| m.now.layer.show(depth, width, area));
+                    let lists = rows.chunks_exact(columns).zip(again.chunks_exact_mut(columns));
+                    for (row, (before, again)) in (area.top..area.bottom).zip(lists) {
+                        let lists = (depth.get(span(row)), still.depth.get(span(row)), still.nearest.get(span(row)));
+                        let (Some(now), Some(still), Some(nearest)) = lists else { continue };
+                        let lists = now.iter().zip(before).zip(still.iter().zip(nearest)).zip(again);
+                        for (((now, before), (still, nearest)), again) in lists {
+                            // Where something is so near that all looks of the backdrop end at it, a change means nothing; where
+                            // there is a mover, what is seen may also change with the depth range.
+                            let hidden = (now < nearest) & (before < nearest);
+                            *again = u8::from(!hidden & ((now != before) | (!same_extent & (now != still))));
+                        }
+                    }
+                },
             );
-            let mut before = rows.iter();
-            for at in (area.top..area.bottom).flat_map(span) {
-                let (Some(now), Some(still), Some(before)) = (depth.get(at), still.depth.get(at), before.next()) else {
-                    break;
-                };
-                // Where there is a mover, what is seen may also change with the depth range.
-                let hidden = still_hides(at, *now) && still_hides(at, *before);
-                if !hidden && (now != before || (!same_extent && now != still)) {
-                    pixels.push(at as u32);
-                }
+            let at = |i: usize| ((area.top + i / columns) * width + area.left + i % columns) as u32;
+            let (eights, rest) = again.as_chunks::<8>();
+            let lists = eights.iter().map(|eight| &eight[..]).chain([rest]).enumerate();
+            for (k, some) in lists.filter(|(_, some)| some.iter().any(|again| *again != 0)) {
+                pixels.extend((8 * k..).zip(some).filter(|(_, again)| **again != 0).map(|(i, _)| at(i)));
             }
         }
         if !same_extent {
             for mover in movers.iter().filter(|m| !moved(m)) {
                 let area = mover.now.layer.area;
                 let all = (area.top..area.bottom).flat_map(|row| row * width + area.left..row * width + area.right);
-                let open = |at: &usize| match (depth.get(*at), still.depth.get(*at)) {
-                    (Some(now), Some(still)) => now != still && !still_hides(*at, *now),
+                let open = |at: &usize| match (depth.get(*at), still.depth.get(*at), still.nearest.get(*at)) {
+                    (Some(now), Some(still), Some(nearest)) => now != still && now >= nearest,
                     _ => false,
                 };
                 pixels.extend(all.filter(open).map(|at| at as u32));
@@ -381,24 +399,9 @@ impl Backdrop {
         }
         let depths = Depths::new(depth, camera.width, camera.height, *extent)?;
         let [mut gone, mut come] = [0; 2].map(|_| Contours::with_room(camera, 256));
-        let mut look = |live: &mut Live| {
-            let shown = depths.visible(&live.piece);
-            if shown != live.shown {
-                live.shown = shown;
-                if shown { &mut come } else { &mut gone }.push(&live.piece);
-            }
-        };
-        let Still { live, unsure, start, looks, .. } = still;
-        let unsure = if same_extent { &[][..] } else { &unsure[..] };
-        for pixel in &*pixels {
-            let ends = [*pixel as usize, *pixel as usize + 1].map(|i| start.get(i).map_or(0, |s| *s as usize));
-            for i in looks.get(ends[0]..ends[1]).unwrap_or_default() {
-                live.get_mut(*i as usize).into_iter().for_each(&mut look);
-            }
-        }
-        for i in unsure {
-            live.get_mut(*i as usize).into_iter().for_each(&mut look);
-        }
+        still.look_again(&depths, pixels, extents, |piece, shown| {
+            if shown { &mut come } else { &mut gone }.push(piece);
+        });
         for mover in movers {
             let (area, moved) = (mover.now.layer.looks, moved(mover));
             if moved || !same_extent || areas.iter().any(|dirty| dirty.meets(&area)) {

@@ -122,7 +122,11 @@ fn a_scene_that_changes_altogether_is_drawn_in_another_way() {
     }
     let fixed = scene(8);
     followed.check(&Solid::group(&fixed), &camera);
-    assert!(followed.check(&Solid::group(&fixed), &camera)[0], "nothing has moved");
+    assert!(!followed.check(&Solid::group(&fixed), &camera)[0], "asked for again, it is still better drawn so");
+    let mut moved = fixed.clone();
+    moved[3] = sphere(7, 5);
+    assert!(followed.check(&Solid::group(&moved), &camera)[0], "most of it stands still");
+    assert!(followed.check(&Solid::group(&moved), &camera)[0], "nothing has moved");
     assert!(!followed.check(&Solid::group(&scene(8)), &camera)[0]);
 }
 
@@ -156,6 +160,16 @@ fn what_is_outside_or_behind_costs_no_drawing() {
     assert_eq!((behind.drawn, behind.outside, behind.hidden), (0, 0, 1));
     // It comes out again, and is there.
     assert_eq!(took(at(0.0, 1.0)).drawn, 1);
+    // Where the eye is within its reach, nobody can say that it is hidden: corners in front of the near plane are not all of it.
+    let beam =
+        |x: f64| cuboid(Vec3::new(0.1, 0.1, 6.0)).placed(Affine::new(DVec3::new(x, 0.0, 3.0), DVec3::ZERO, DVec3::ONE));
+    for x in [0.5, 0.6, 0.7] {
+        let solid = Solid::group(&[fixed.clone(), beam(x)]);
+        followed.backdrop.draw(&solid, &camera, &mut followed.tools);
+        let (seen, wanted) = (followed.backdrop.contours(&camera), Contours::drawn(&solid, &camera));
+        assert_eq!(bits(&seen), bits(&wanted));
+        assert!(wanted.len() > Contours::drawn(&fixed, &camera).len());
+    }
     // Drawn at once, too, nothing is drawn of what is outside.
     let before = work::work();
     let lonely = Contours::drawn(&ball.placed(at(9.0, 1.0)), &camera);

@@ -7,8 +7,8 @@ use super::lanes::{Batch, Kind, LANES};
 use super::marks::Marks;
 use super::place::Extent;
 use super::project::Vertices;
-use super::raster::Area;
-use super::triangle::Plane;
+use super::raster::{Area, Wanted};
+use super::triangle::{Plane, is_flat, keep_all};
 use crate::geom::{Patches, Topology};
 use glam::Vec4;
 
@@ -76,7 +76,7 @@ impl Candidates {
         self.count += usize::from(counts);
     }
 
-    /// Keeps the nearer of a mesh's triangles and what is there, in the rows of an area; with marks, at marked pixels at least.
+    /// Keeps the nearer of a mesh's triangles and what is there, in the rows of an area.
     #[inline(always)]
     pub fn fill(
         &mut self,
@@ -84,9 +84,10 @@ impl Candidates {
         vertices: &Vertices<'_>,
         (size, back): (Vec4, f64),
         area: &Area,
-        marks: Option<&Marks>,
+        wanted: Wanted<'_>,
         buffer: &mut [f32],
     ) {
+        let marks = wanted.marks();
         self.find(topology, vertices, size, back, marks);
         let width = area.right - area.left;
         let large = |face: u32, extent: Extent, buffer: &mut [f32]| {
@@ -105,11 +106,18 @@ impl Candidates {
             if kind == Kind::Large {
                 return large(face, *extent, buffer);
             }
-            let mut plane = None;
+            let (mut plane, mut flat) = (None, None);
             batch.rows(i, extent, area.right, |row, from, outside| {
                 let at = (row - area.top) * width + from - area.left;
                 if marks.is_some_and(|marks| marks.window(at, LANES) as u32 & !outside.to_bitmask() == 0) {
                     return;
+                }
+                if let Some(least) = wanted.least(at) {
+                    // A triangle without area covers nothing, whatever its rounded corners say.
+                    if *flat.get_or_insert_with(|| is_flat(&vertices.corners(topology, face))) {
+                        return;
+                    }
+                    return keep_all(buffer, at, least, outside);
                 }
                 let corners = || Plane::new(&vertices.corners(topology, face), extent.ends()[0][0]);
                 if let Some(plane) = plane.get_or_insert_with(corners) {

@@ -8,9 +8,9 @@
 
 use super::candidates::Candidates;
 use super::contours::Contours;
-use super::frame::to_depth;
+use super::frame::{depth_of, to_depth};
 use super::project::{DepthRange, Lens, Placement, Projected};
-use super::raster::{Area, draw_mesh};
+use super::raster::{Area, Wanted, draw_mesh};
 use super::simd::vectorised;
 use super::trace::{Room, trace_mesh};
 use super::visibility::{BESIDE, Depths, Piece};
@@ -43,7 +43,12 @@ pub(super) struct Layer {
     pub looks: Area,
     /// The pieces seen in the picture it was shown in last.
     seen: Contours,
+    /// Where depth was wanted. Kept for its memory.
+    exact: Vec<u8>,
 }
+
+/// What a layer is drawn before, by pixel of the picture: where all of a mesh is nearer than this, it does not matter how near it is.
+pub(super) type Behind<'a> = &'a [f32];
 
 /// A layer and what it belongs to.
 struct Slot {
@@ -212,7 +217,7 @@ impl Layers {
         (slot.mesh, slot.affine, slot.camera) = (Arc::downgrade(&instance.mesh), affine, eye);
         (slot.made, slot.seen_at) = ((self.clock, at), 0);
         let tools = (&mut self.projected, &mut self.candidates);
-        slot.layer.draw(instance, camera, tools, &mut self.room, |_, _| false);
+        slot.layer.draw(instance, camera, tools, &mut self.room, |_, _| Sight::Whole);
         self.bytes += slot.layer.bytes();
         at
     }
@@ -227,16 +232,27 @@ impl Layers {
     }
 }
 
+/// What of a mesh there is to be seen.
+pub(super) enum Sight<'a> {
+    /// All that it has.
+    Whole,
+    /// It stands before something.
+    Before(Behind<'a>),
+    /// Nothing.
+    Hidden,
+}
+
 impl Layer {
-    /// Draws a mesh alone, unless it is told hidden by its depth range and the pixels it reaches; whether it was drawn.
-    pub fn draw(
+    /// Draws a mesh alone, as its depth range and the pixels it reaches ask for. Where something is known of what is behind it, depth is exact where
+    /// its pieces look and where it may matter to what is behind; elsewhere it may be told farther than it is, but not so far that it would matter.
+    pub fn draw<'a>(
         &mut self,
         instance: &Instance,
         camera: &Camera,
         (projected, candidates): (&mut Projected, &mut Candidates),
         room: &mut Room,
-        hidden: impl FnOnce(&DepthRange, &Area) -> bool,
-    ) -> bool {
+        sight: impl FnOnce(&DepthRange, &Area) -> Sight<'a>,
+    ) {
         let placement = Placement::new(camera, &instance.affine);
         projected.clear();
         self.range = projected.add(&instance.mesh, &placement, &Lens::new(camera));
@@ -248,19 +264,54 @@ impl Layer {
         self.looks = Area::default();
         if vertices.outside(camera) {
             work::count(|work| work.outside += 1);
-            return true;
+            return;
         }
-        if hidden(&self.range, &self.area) {
+        // The depth range of a mesh that the near plane cuts says nothing of what is cut.
+        let sight = if vertices.whole { sight(&self.range, &self.area) } else { Sight::Whole };
+        if let Sight::Hidden = sight {
             work::count(|work| work.hidden += 1);
             self.area = Area::default();
-            return false;
+            return;
         }
         work::drawn(&instance.mesh);
-        draw_mesh(&instance.mesh, &placement, camera, &vertices, candidates, &self.area, &mut self.depth);
-        to_depth(camera, &mut self.depth);
         trace_mesh(&instance.mesh, &placement, camera, &vertices, room, |piece, _| self.pieces.push(piece));
         self.looks = Area::looked_at(&self.pieces, camera);
-        true
+        let wanted = match sight {
+            Sight::Before(behind) => {
+                let least = vertices.least_nearness();
+                self.find_exact(camera, behind, depth_of(Lens::new(camera).pinhole, least));
+                Wanted::Exact(&self.exact, least)
+            }
+            _ => Wanted::All,
+        };
+        draw_mesh(&instance.mesh, &placement, camera, &vertices, candidates, (&self.area, wanted), &mut self.depth);
+        to_depth(camera, &mut self.depth);
+    }
+
+    /// Where the depth of its pixels has to be known: where own pieces look, and where its farthest point is not nearer than what is behind.
+    fn find_exact(&mut self, camera: &Camera, behind: Behind<'_>, farthest: f32) {
+        let Layer { area, exact, pieces, .. } = self;
+        let (columns, width) = (area.right - area.left, camera.width as usize);
+        exact.clear();
+        exact.resize(area.pixels(), 1);
+        if columns == 0 {
+            return;
+        }
+        vectorised(
+            #[inline(always)]
+            || {
+                for (row, exact) in (area.top..).zip(exact.chunks_exact_mut(columns)) {
+                    let behind = behind.get(row * width + area.left..row * width + area.right).unwrap_or_default();
+                    exact.iter_mut().zip(behind).for_each(|(exact, behind)| *exact = u8::from(farthest >= *behind));
+                }
+            },
+        );
+        for pixel in pieces.iter().flat_map(|piece| [0, 1].map(|side| piece.pixel(side))).flatten() {
+            let (row, column) = (pixel as usize / width, pixel as usize % width);
+            if (area.top..area.bottom).contains(&row) && (area.left..area.right).contains(&column) {
+                exact[(row - area.top) * columns + column - area.left] = 1;
+            }
+        }
     }
 
     /// Puts what is nearer than the picture into it, in some area.
@@ -284,7 +335,7 @@ impl Layer {
 
     fn bytes(&self) -> usize {
         let numbers = self.depth.capacity() + 5 * self.seen.x.capacity();
-        numbers * size_of::<f32>() + self.pieces.capacity() * size_of::<Piece>()
+        numbers * size_of::<f32>() + self.exact.capacity() + self.pieces.capacity() * size_of::<Piece>()
     }
 }
 

@@ -7,7 +7,7 @@ use super::candidates::Candidates;
 use super::frame::depth_of;
 use super::marks::Marks;
 use super::project::{Lens, Placement, Projected};
-use super::raster::{Area, empty, fill_mesh};
+use super::raster::{Area, Wanted, empty, fill_mesh};
 use super::triangle::bits;
 use crate::geom::Solid;
 
@@ -49,7 +49,7 @@ impl Looked {
         for (i, item) in solid.instances().iter().enumerate() {
             let (placement, vertices) = (Placement::new(camera, &item.affine), projected.mesh(i));
             if !vertices.outside(camera) {
-                fill_mesh(&item.mesh, &placement, camera, &vertices, candidates, (&area, Some(&*marks)), depth);
+                fill_mesh(&item.mesh, &placement, camera, &vertices, candidates, (&area, Wanted::Marked(marks)), depth);
             }
         }
         let pinhole = Lens::new(camera).pinhole;

@@ -346,6 +346,11 @@ impl Vertices<'_> {
         self.places.iter().fold(Place::INFINITY, |a, b| a.min(*b))
     }
 
+    /// The least nearness of all.
+    pub fn least_nearness(&self) -> f32 {
+        self.nearness.iter().fold(f32::INFINITY, |a, b| a.min(*b))
+    }
+
     /// Whether all of the mesh is behind the eye, or beside the picture by half a pixel at least: it covers no pixel and has no contour there.
     pub fn outside(&self, camera: &Camera) -> bool {
         if !self.whole {

@@ -4,6 +4,7 @@
 
 use super::Camera;
 use super::candidates::Candidates;
+use super::lanes::LANES;
 use super::marks::Marks;
 use super::place::{Extent, place, size};
 use super::project::{DepthRange, Lens, Placement, Point, Projected, Vertices, project};
@@ -145,10 +146,44 @@ pub(super) fn draw_nearness(
         let placement = Placement::new(camera, &item.affine);
         let vertices = projected.mesh(i);
         if !vertices.outside(camera) {
-            fill_mesh(&item.mesh, &placement, camera, &vertices, candidates, (&area, None), buffer);
+            fill_mesh(&item.mesh, &placement, camera, &vertices, candidates, (&area, Wanted::All), buffer);
         }
     }
     range
+}
+
+/// Where the nearness of a mesh is wanted.
+#[derive(Clone, Copy)]
+pub(super) enum Wanted<'a> {
+    /// Everywhere.
+    All,
+    /// At marked pixels of the whole image; nothing is said of others.
+    Marked(&'a Marks),
+    /// At those pixels of an area, a byte each, that are not 0; at others that the mesh covers, anything from this least nearness on.
+    Exact(&'a [u8], f32),
+}
+
+impl<'a> Wanted<'a> {
+    /// The marks, if there are some.
+    #[inline(always)]
+    pub fn marks(self) -> Option<&'a Marks> {
+        match self {
+            Wanted::Marked(marks) => Some(marks),
+            _ => None,
+        }
+    }
+
+    /// The least nearness, if that will do for all lanes from a pixel of the area on.
+    #[inline(always)]
+    pub fn least(self, at: usize) -> Option<f32> {
+        match self {
+            Wanted::Exact(exact, least) => {
+                let lanes = exact.get(at..)?.first_chunk::<LANES>()?;
+                (u64::from_ne_bytes(*lanes) == 0).then_some(least)
+            }
+            _ => None,
+        }
+    }
 }
 
 /// Draws the nearness of one mesh into `buffer` (the rows of the area, refilled here).
@@ -158,32 +193,31 @@ pub(super) fn draw_mesh(
     camera: &Camera,
     vertices: &Vertices<'_>,
     candidates: &mut Candidates,
-    area: &Area,
+    (area, wanted): (&Area, Wanted<'_>),
     buffer: &mut Vec<f32>,
 ) {
     buffer.clear();
     buffer.resize(area.pixels(), empty(camera));
-    fill_mesh(mesh, placement, camera, vertices, candidates, (area, None), buffer);
+    fill_mesh(mesh, placement, camera, vertices, candidates, (area, wanted), buffer);
 }
 
-/// Keeps the nearer of one mesh and what is there, in the rows of an area; with marks, at marked pixels at least, and the area is the
-/// whole image.
+/// Keeps the nearer of one mesh and what is there, in the rows of an area; with marks, the area is the whole image.
 pub(super) fn fill_mesh(
     mesh: &Mesh,
     placement: &Placement,
     camera: &Camera,
     vertices: &Vertices<'_>,
     candidates: &mut Candidates,
-    (area, marks): (&Area, Option<&Marks>),
+    (area, wanted): (&Area, Wanted<'_>),
     buffer: &mut [f32],
 ) {
     if !vertices.whole {
-        return cut_triangles(mesh, placement, camera, vertices, |t, _, _| t.keep(buffer, area, marks));
+        return cut_triangles(mesh, placement, camera, vertices, |t, _, _| t.keep(buffer, area, wanted.marks()));
     }
     let how = (size(camera.width, camera.height), back(mesh, placement, vertices));
     vectorised(
         #[inline(always)]
-        || candidates.fill(&mesh.topology, vertices, how, area, marks, buffer),
+        || candidates.fill(&mesh.topology, vertices, how, area, wanted, buffer),
     );
 }
 

@@ -58,12 +58,11 @@ impl Plane {
     /// From some column on; `None` of a triangle without area.
     #[inline(always)]
     pub fn new(points: &[Point; 3], column: usize) -> Option<Plane> {
-        let [a, b, c] = points;
-        let area = area(points);
-        if area == 0.0 || !area.is_finite() {
+        if is_flat(points) {
             return None;
         }
-        let inverse = 1.0 / area;
+        let [a, b, c] = points;
+        let inverse = 1.0 / area(points);
         let (qb, qc) = (b.nearness - a.nearness, c.nearness - a.nearness);
         let dx = (qb * (c.y - a.y) - qc * (b.y - a.y)) * inverse;
         let dy = (qc * (b.x - a.x) - qb * (c.x - a.x)) * inverse;
@@ -91,6 +90,21 @@ impl Plane {
         let q = (along + self.row(row)).fast_max(lo).fast_min(hi);
         *pixels = (q.simd_gt(there) & !all_bits(outside)).bitselect(q, there).to_array();
     }
+}
+
+/// Keeps the nearer of this and what is there, in the lanes of a triangle, at `at` in a buffer.
+#[inline(always)]
+pub(super) fn keep_all(buffer: &mut [f32], at: usize, nearness: f32, outside: i32x8) {
+    let Some(pixels) = buffer.get_mut(at..).and_then(|b| b.first_chunk_mut::<LANES>()) else { return };
+    let (there, q) = (f32x8::new(*pixels), f32x8::splat(nearness));
+    *pixels = (q.simd_gt(there) & !all_bits(outside)).bitselect(q, there).to_array();
+}
+
+/// Whether a triangle has no area.
+#[inline(always)]
+pub(super) fn is_flat(points: &[Point; 3]) -> bool {
+    let area = area(points);
+    area == 0.0 || !area.is_finite()
 }
 
 /// Twice the area in pixels; negative when counter-clockwise as seen in the image.

@@ -66,11 +66,32 @@ pub(super) struct Piece {
     sides: [Side; 2],
 }
 
+/// A look without its pixel: all that decides whether it is free, but the depth there and the depth range.
+#[derive(Clone, Copy, Debug, Default)]
+pub(super) struct Glance {
+    depth: f64,
+    slack: f64,
+    /// The piece that looks, by a number of whoever asked.
+    pub piece: u32,
+    /// Which of its sides.
+    pub side: u8,
+    inside: bool,
+    edge: bool,
+}
+
 impl Piece {
     /// The pixel on the first or the second side that it looks at.
     #[inline]
     pub fn pixel(&self, side: usize) -> Option<u32> {
         self.sides.get(side).map(|side| side.pixel).filter(|&pixel| pixel != NOWHERE)
+    }
+
+    /// The look to the first or the second side, and the pixel that it looks at; `number` is that of the piece.
+    #[inline]
+    pub fn glance(&self, side: u8, number: u32) -> Option<(u32, Glance)> {
+        let Side { pixel, inside, slack } = *self.sides.get(usize::from(side))?;
+        let glance = Glance { depth: self.depth, slack, piece: number, side, inside, edge: self.edge };
+        (pixel != NOWHERE).then_some((pixel, glance))
     }
 }
 
@@ -144,24 +165,34 @@ impl<'a> Depths<'a> {
     /// Whether nothing beside the piece is nearer than its `depth` less the slack.
     #[inline]
     fn free(&self, side: &Side, depth: f64, most: f64) -> bool {
-        let seen = self.depth.get(side.pixel as usize).map_or(f64::INFINITY, |&d| f64::from(d));
-        seen >= self.threshold(side, depth, most)
+        f64::from(self.at(side.pixel as usize)) >= self.threshold([depth, side.slack, most], side.inside)
     }
 
     /// The least depth that leaves a piece free.
     #[inline]
-    fn threshold(&self, side: &Side, depth: f64, most: f64) -> f64 {
-        let slack = side.slack.min(most);
+    fn threshold(&self, [depth, slack, most]: [f64; 3], inside: bool) -> f64 {
+        let slack = slack.min(most);
         // Outside the image only the object itself can be looked at: be generous, its side may bend towards the eye.
-        let slack = if side.inside { slack } else { slack.max(10.0 * self.tolerance) };
+        let slack = if inside { slack } else { slack.max(10.0 * self.tolerance) };
         depth - slack - self.tolerance - 1e-6 * depth
     }
 
-    /// The pixels that a piece looks at, each with the least depth there that leaves it free.
-    pub fn looks(&self, piece: &Piece) -> impl Iterator<Item = (usize, f64)> {
-        let (most, depth) = (self.most[usize::from(piece.edge)], piece.depth);
-        let sides = piece.sides.into_iter().filter(|side| side.pixel != NOWHERE);
-        sides.map(move |side| (side.pixel as usize, self.threshold(&side, depth, most)))
+    /// The depth of a pixel.
+    #[inline]
+    pub fn at(&self, pixel: usize) -> f32 {
+        self.depth.get(pixel).copied().unwrap_or(f32::INFINITY)
+    }
+
+    /// The least depth at its pixel that leaves a look free; the greater the depth range, the less.
+    #[inline]
+    pub fn least(&self, glance: &Glance) -> f64 {
+        self.threshold([glance.depth, glance.slack, self.most[usize::from(glance.edge)]], glance.inside)
+    }
+
+    /// Whether a depth at its pixel leaves a look free.
+    #[inline]
+    pub fn frees(&self, glance: &Glance, seen: f32) -> bool {
+        f64::from(seen) >= self.least(glance)
     }
 
     /// Less than the least depth that leaves any piece free of a mesh with this depth range.

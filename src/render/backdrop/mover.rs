@@ -5,7 +5,7 @@ use crate::geom::{Instance, Mesh};
 use crate::render::Camera;
 use crate::render::candidates::Candidates;
 use crate::render::contours::Contours;
-use crate::render::layers::{Layer, affine_bits};
+use crate::render::layers::{Layer, Sight, affine_bits};
 use crate::render::project::{DepthRange, Projected};
 use crate::render::raster::Area;
 use crate::render::trace::Room;
@@ -26,8 +26,15 @@ pub struct Own {
     mesh: Weak<Mesh>,
     affine: [u64; 12],
     pub layer: Layer,
-    /// Whether it was left undrawn, since the backdrop hides all of it.
-    pub hidden: bool,
+    /// What it was drawn before, if that left out some of it: what hides all of it, or does not mind how near it is.
+    settled: Option<Arc<()>>,
+}
+
+impl Own {
+    /// Whether it may be looked at before something else, too.
+    pub fn is_whole(&self) -> bool {
+        self.settled.is_none()
+    }
 }
 
 /// A mesh that has moved: its layer where it is, and where it was before.
@@ -45,11 +52,22 @@ impl Mover {
         Mover { leaf, ..Mover::default() }
     }
 
-    /// Its layer is that of the instance from here on; nothing is drawn of one that this backdrop hides.
-    pub fn move_to(&mut self, instance: &Instance, camera: &Camera, tools: &mut Tools, behind: Option<&Still>) {
+    /// Its layer is that of the instance from here on. Nothing is drawn of one that this backdrop hides; if it is the only mover, its depth
+    /// need only be known where it matters.
+    pub fn move_to(
+        &mut self,
+        instance: &Instance,
+        camera: &Camera,
+        tools: &mut Tools,
+        behind: Option<&Still>,
+        only: bool,
+    ) {
         let affine = affine_bits(&instance.affine);
+        let holds = |own: &Own| {
+            own.settled.as_ref().is_none_or(|known| only && behind.is_some_and(|b| Arc::ptr_eq(known, &b.settled)))
+        };
         let is_it = |own: &Own| {
-            !own.hidden && own.affine == affine && std::ptr::eq(own.mesh.as_ptr(), Arc::as_ptr(&instance.mesh))
+            holds(own) && own.affine == affine && std::ptr::eq(own.mesh.as_ptr(), Arc::as_ptr(&instance.mesh))
         };
         if is_it(&self.now) {
             return;
@@ -58,8 +76,19 @@ impl Mover {
         if !is_it(&self.now) {
             (self.now.mesh, self.now.affine) = (Arc::downgrade(&instance.mesh), affine);
             let Tools { projected, candidates, room } = tools;
-            let hides = |range: &DepthRange, area: &Area| behind.is_some_and(|still| still.hides(range, area, camera));
-            self.now.hidden = !self.now.layer.draw(instance, camera, (projected, candidates), room, hides);
+            let settled = &mut self.now.settled;
+            *settled = None;
+            let sight = |range: &DepthRange, area: &Area| {
+                let Some(still) = behind else { return Sight::Whole };
+                let sight = match still.hides(range, area, camera) {
+                    true => Sight::Hidden,
+                    false if only => Sight::Before(&still.nearest),
+                    false => return Sight::Whole,
+                };
+                *settled = Some(Arc::clone(&still.settled));
+                sight
+            };
+            self.now.layer.draw(instance, camera, (projected, candidates), room, sight);
         }
     }
 

@@ -1,19 +1,18 @@
-//! What stands still: its depth, and its pieces of contour sorted by how much they depend on what else there is.
+//! What stands still: its depth, and its pieces of contour by the pixels that they look at.
 
 use crate::render::Camera;
 use crate::render::project::DepthRange;
 use crate::render::raster::Area;
-use crate::render::visibility::{Depths, Piece};
+use crate::render::visibility::{Depths, Glance, Piece};
+use std::sync::Arc;
 
 /// Half the width of the depth ranges that a backdrop is first made ready for, relatively.
 const FIRST_WIDTH: f64 = 0.005;
 
-/// A piece of the backdrop.
-pub struct Live {
-    pub piece: Piece,
-    pub leaf: usize,
-    pub shown: bool,
-}
+/// A bit for each side by which a piece is free.
+const FREE: u8 = 0b11;
+/// Whether the piece was told as shown.
+const SHOWN: u8 = 0b100;
 
 /// What stands still.
 #[derive(Default)]
@@ -22,19 +21,26 @@ pub struct Still {
     pub range: DepthRange,
     /// All pieces, with the number of their mesh.
     pub pieces: Vec<(Piece, usize)>,
+    /// Stands for what it was settled for: for all below.
+    pub settled: Arc<()>,
     /// The depth ranges of the scene for which the rest holds.
     extents: [f64; 2],
     /// Half the width of those, relatively.
     width: f64,
-    /// Pieces that the backdrop does not hide at the greatest of these depth ranges.
-    pub live: Vec<Live>,
-    /// Of those, the ones with a look that it ends at the least of them only.
-    pub unsure: Vec<u32>,
-    /// By pixel: the least depth that leaves any of those free that look there, whatever the depth range.
-    pub nearest: Vec<f64>,
-    /// Where in `looks` the pieces that look at each pixel begin.
-    pub start: Vec<u32>,
-    pub looks: Vec<u32>,
+    /// Pieces that the backdrop does not hide at the greatest of these depth ranges, with the number of their mesh.
+    live: Vec<(Piece, usize)>,
+    /// Of each of those, which of its looks are free, and whether it is shown.
+    state: Vec<u8>,
+    /// Looks that the backdrop ends at the least of these depth ranges only, with the least one at which it does not, in that order,
+    /// and their pixels.
+    unsure: Vec<(f64, u32, u32)>,
+    /// By pixel: the least depth that leaves any look there free, whatever the depth range.
+    pub nearest: Vec<f32>,
+    /// Where in `looks` those at each pixel begin.
+    start: Vec<u32>,
+    looks: Vec<Glance>,
+    /// Pieces of which a look has changed.
+    touched: Vec<u32>,
 }
 
 impl Still {
@@ -65,32 +71,21 @@ impl Still {
 
     /// Sorts the pieces for depth ranges about this one; for more of them if it has been done before.
     pub fn settle(&mut self, camera: &Camera, extent: f64, again: bool) -> Option<()> {
+        self.settled = Arc::default();
         self.width = if again { (2.0 * self.width).min(0.5) } else { self.width };
         self.extents = [extent * (1.0 - self.width), extent * (1.0 + self.width)];
-        let [least, most] = self.extents.map(|extent| Depths::new(&self.depth, camera.width, camera.height, extent));
-        let (least, most) = (least?, most?);
-        self.nearest.clear();
-        self.nearest.resize(self.depth.len(), f64::INFINITY);
+        let depths = |extent: f64| Depths::new(&self.depth, camera.width, camera.height, extent);
+        let (least, most) = (depths(self.extents[0])?, depths(self.extents[1])?);
         self.live.clear();
-        self.unsure.clear();
-        for (piece, leaf) in self.pieces.iter().filter(|(piece, _)| most.visible(piece)) {
-            // By each look alone: a mover may end the other one.
-            if (0..2).any(|side| most.visible_by(piece, side) && !least.visible_by(piece, side)) {
-                self.unsure.push(self.live.len() as u32);
-            }
-            self.live.push(Live { piece: *piece, leaf: *leaf, shown: false });
-            for (pixel, depth) in most.looks(piece) {
-                if let Some(nearest) = self.nearest.get_mut(pixel) {
-                    *nearest = nearest.min(depth);
-                }
-            }
-        }
+        self.live.extend(self.pieces.iter().filter(|(piece, _)| most.visible(piece)));
+        self.state.clear();
+        self.state.resize(self.live.len(), 0);
         // A counting sort by pixel.
         self.start.clear();
         self.start.resize(self.depth.len() + 2, 0);
-        let at = |live: &Live| [0, 1].map(|side| live.piece.pixel(side).map(|p| p as usize)).into_iter().flatten();
-        for pixel in self.live.iter().flat_map(at) {
-            self.start[pixel + 2] += 1;
+        let glances = |i: usize, piece: &Piece| [0, 1].map(|side| piece.glance(side, i as u32)).into_iter().flatten();
+        for (i, (piece, _)) in self.live.iter().enumerate() {
+            glances(i, piece).for_each(|(pixel, _)| self.start[pixel as usize + 2] += 1);
         }
         let mut sum = 0;
         for start in &mut self.start {
@@ -98,14 +93,127 @@ impl Still {
             *start = sum;
         }
         self.looks.clear();
-        self.looks.resize(sum as usize, 0);
-        for (i, live) in self.live.iter().enumerate() {
-            for pixel in at(live) {
-                let place = &mut self.start[pixel + 1];
-                self.looks[*place as usize] = i as u32;
+        self.looks.resize(sum as usize, Glance::default());
+        for (i, (piece, _)) in self.live.iter().enumerate() {
+            for (pixel, glance) in glances(i, piece) {
+                let place = &mut self.start[pixel as usize + 1];
+                self.looks[*place as usize] = glance;
                 *place += 1;
             }
         }
+        self.nearest.clear();
+        self.unsure.clear();
+        for (pixel, depth) in self.depth.iter().enumerate() {
+            let mut nearest = f32::INFINITY;
+            for at in self.start[pixel]..self.start[pixel + 1] {
+                let glance = &self.looks[at as usize];
+                nearest = nearest.min(rounded_up(most.least(glance)));
+                if most.frees(glance, *depth) && !least.frees(glance, *depth) {
+                    let free = |extent: f64| depths(extent).is_some_and(|d| d.frees(glance, *depth));
+                    self.unsure.push((first_true(self.extents, free), at, pixel as u32));
+                }
+            }
+            self.nearest.push(nearest);
+        }
+        self.unsure.sort_unstable_by(|a, b| a.0.total_cmp(&b.0));
         Some(())
+    }
+
+    /// Looks at everything; how many pieces are shown.
+    pub fn look_at_all(&mut self, depths: &Depths<'_>) -> usize {
+        let mut shown = 0;
+        for ((piece, _), state) in self.live.iter().zip(&mut self.state) {
+            let [first, second] = [0, 1].map(|side| u8::from(depths.visible_by(piece, side)) << side);
+            let free = first | second;
+            *state = if free == 0 { 0 } else { free | SHOWN };
+            shown += usize::from(free != 0);
+        }
+        shown
+    }
+
+    /// Looks again at some pixels, and at whatever the depth range decides that was one and is another; `changed` is told pieces
+    /// that are shown no longer (false) or now (true), each once.
+    pub fn look_again(
+        &mut self,
+        depths: &Depths<'_>,
+        pixels: &[u32],
+        extents: [f64; 2],
+        mut changed: impl FnMut(&Piece, bool),
+    ) {
+        let Still { looks, start, state, touched, live, unsure, .. } = self;
+        touched.clear();
+        let mut look = |glance: &Glance, pixel: usize| {
+            let Some(state) = state.get_mut(glance.piece as usize) else { return };
+            let free = u8::from(depths.frees(glance, depths.at(pixel))) << glance.side;
+            let now = (*state & !(1 << glance.side)) | free;
+            if now != *state {
+                *state = now;
+                touched.push(glance.piece);
+            }
+        };
+        for pixel in pixels.iter().map(|p| *p as usize) {
+            let ends = [pixel, pixel + 1].map(|i| start.get(i).map_or(0, |s| *s as usize));
+            looks.get(ends[0]..ends[1]).unwrap_or_default().iter().for_each(|glance| look(glance, pixel));
+        }
+        let [low, high] = [extents[0].min(extents[1]), extents[0].max(extents[1])];
+        let between = [low, high].map(|extent| unsure.partition_point(|(flip, ..)| *flip <= extent));
+        for (_, at, pixel) in unsure.get(between[0]..between[1]).unwrap_or_default() {
+            looks.get(*at as usize).into_iter().for_each(|glance| look(glance, *pixel as usize));
+        }
+        for piece in &*touched {
+            let (Some(state), Some((piece, _))) = (state.get_mut(*piece as usize), live.get(*piece as usize)) else {
+                continue;
+            };
+            let shown = *state & FREE != 0;
+            if shown != (*state & SHOWN != 0) {
+                *state ^= SHOWN;
+                changed(piece, shown);
+            }
+        }
+    }
+
+    /// The pieces that are shown, with the number of their mesh.
+    pub fn shown(&self) -> impl Iterator<Item = &(Piece, usize)> {
+        self.live.iter().zip(&self.state).filter(|(_, state)| **state & SHOWN != 0).map(|(live, _)| live)
+    }
+}
+
+/// The least number in single precision that is not less: `f64::from(x) < v` exactly if `x < rounded_up(v)`.
+fn rounded_up(v: f64) -> f32 {
+    let rounded = v as f32;
+    if f64::from(rounded) < v { rounded.next_up() } else { rounded }
+}
+
+/// The least number above the first of two positive ones at which a monotone condition holds, which holds at the second one and not at the first.
+fn first_true([low, high]: [f64; 2], holds: impl Fn(f64) -> bool) -> f64 {
+    // Positive numbers are in the order of their bits.
+    let (mut low, mut high) = (low.to_bits(), high.to_bits());
+    while low + 1 < high {
+        let middle = low + (high - low) / 2;
+        if holds(f64::from_bits(middle)) { high = middle } else { low = middle }
+    }
+    f64::from_bits(high)
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    #[test]
+    fn the_first_number_at_which_a_condition_holds() {
+        let third = 1.0 / 3.0;
+        assert_eq!(first_true([0.1, 0.9], |x| x >= third), third);
+        assert_eq!(first_true([0.1, 0.9], |x| x >= 0.9), 0.9);
+        assert_eq!(first_true([0.1, 0.9], |x| x > 0.1), 0.1f64.next_up());
+    }
+
+    #[test]
+    fn comparisons_are_the_same_after_rounding_up() {
+        for v in [0.1, 1.0, 1.0 + 1e-12, -0.3, 1e300, -1e300, f64::INFINITY, f64::NEG_INFINITY] {
+            let up = rounded_up(v);
+            for x in [up, up.next_up(), up.next_down(), v as f32, f32::INFINITY, 0.0] {
+                assert_eq!(f64::from(x) < v, x < up, "{x} {v}");
+            }
+        }
     }
 }
