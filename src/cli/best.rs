@@ -1,4 +1,4 @@
-//! The best draw of a run as files: its trace, depth, normals, mask, pictures, meshes, exports.
+//! The best state of a run as files: its trace, depth, normals, mask, pictures, meshes, exports.
 //!
 //! Not the run (`job`), and not what is printed.
 
@@ -8,7 +8,7 @@ use super::{Failure, plain, scene};
 use image::GrayImage;
 use pcadlang::Model;
 use pcadlang::geom::{Mesh, Solid, glb, obj};
-use pcadlang::infer::{BestSoFar, ChainResult};
+use pcadlang::infer::{BestSoFar, BestState, ChainResult};
 use pcadlang::lang::builtins::scene::ViewValue;
 use pcadlang::render::View;
 use pcadlang::report::pictures::{self, png};
@@ -22,7 +22,7 @@ use std::time::{Duration, Instant};
 /// When the best state is written for the first time.
 const FIRST: Duration = Duration::from_millis(200);
 
-/// What the page shows of the best draw.
+/// What the page shows of the best state.
 #[derive(Default)]
 pub struct Shown {
     /// Captions and PNGs.
@@ -35,19 +35,18 @@ pub struct Shown {
     pub view: Option<ViewValue>,
 }
 
-/// Rebuilds the draw with the highest log joint density, saves it, and draws it if it has a view.
-pub fn best_draw(
+/// Rebuilds the state with the highest log joint density that any chain was in, saves it, and draws it if it has a view.
+pub fn show_best(
     dir: &RunDir,
     seed: u64,
     model: &Model,
+    best: Option<&BestState>,
     chains: &[ChainResult],
     photo: Option<&Photo>,
 ) -> Result<Shown, Failure> {
-    let best = chains.iter().filter_map(|c| c.best.as_ref()).max_by(|x, y| x.0.total_cmp(&y.0));
-    let Some((_, choices)) = best else { return Ok(Shown::default()) };
+    let Some(best) = best else { return Ok(Shown::default()) };
     let draws = scene::predictive(seed, 0);
-    let built = Trace::generate(Arc::clone(model.code()), choices.iter().cloned(), draws, model.limits().clone());
-    let (mut trace, _) = built.map_err(|e| Failure::from(model.run_error(*e)))?;
+    let mut trace = scene::rebuilt(model, &best.choices, draws)?;
     let saved = serde_json::to_vec(&trace.save(model.hash())).unwrap_or_default();
     write(dir, "best.trace.json", &saved)?;
     let mut shown = Shown::default();
@@ -67,9 +66,7 @@ pub fn keep_best(dir: &RunDir, model: &Model, best: &BestSoFar, ending: &Ending,
     let (begun, mut written) = (Instant::now(), f64::NEG_INFINITY);
     while !ending.within((begun.elapsed() / 2).clamp(FIRST.min(most), most)) {
         let Some(state) = best.state().filter(|s| s.log_joint > written) else { continue };
-        let (code, limits) = (Arc::clone(model.code()), model.limits().clone());
-        let built = Trace::generate(code, state.choices.iter().cloned(), scene::predictive(0, 0), limits);
-        if let Ok((trace, _)) = built
+        if let Ok(trace) = scene::rebuilt(model, &state.choices, scene::predictive(0, 0))
             && let Ok(saved) = serde_json::to_vec(&trace.save(model.hash()))
             && dir.write("best.trace.json", &saved).is_ok()
         {
@@ -110,7 +107,7 @@ fn draw(
         let resized = image::imageops::resize(p.rgb(), large.0, large.1, image::imageops::FilterType::Triangle);
         shown.pictures.push(("the photograph", encode(png(&resized))?));
     }
-    shown.pictures.push(("the best draw over it", overlay));
+    shown.pictures.push(("the best state over it", overlay));
     let spread = encode(png(&frequency(chains, seed, 128)))?;
     write(dir, "uncertainty.png", &spread)?;
     shown.pictures.push(("how often the last draws of the chains cover a pixel", spread));

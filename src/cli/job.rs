@@ -3,13 +3,13 @@
 //! Invariant: `run.json` says `done` only when every other file of the folder is whole.
 
 use super::args::Job;
-use super::best::{best_draw, keep_best};
+use super::best::{keep_best, show_best};
 use super::keypoints::Joints;
 use super::progress::{self, Ending};
 use super::{Failure, files, given, plain};
 use pcadlang::bank::BankFiles;
 use pcadlang::infer::draws::{KernelStats, Sink, SiteStats};
-use pcadlang::infer::{BestSoFar, ChainResult, Progress, Watch, Watches};
+use pcadlang::infer::{BestSoFar, BestState, ChainResult, Progress, Watch, Watches};
 use pcadlang::report::html::{MeshData, Page, page};
 use pcadlang::report::{
     ChainDraws, ChainFiles, Memory, Mode, Quantity, RunDir, bytes_hash, modes, quantities, seconds, table, text_hash,
@@ -312,7 +312,8 @@ fn fill(
         "modes": modes, "warnings": warnings, "approximate": approximate, "every": every,
     });
     write(dir, "summary.json", &serde_json::to_vec_pretty(&summary).unwrap_or_default())?;
-    let drawn = best_draw(dir, s.seed, model, &chains, photo.as_ref())?;
+    let best = best.state();
+    let drawn = show_best(dir, s.seed, model, best.as_deref(), &chains, photo.as_ref())?;
     let elapsed = begun.elapsed().as_secs_f64();
     if let Some(found) = drawn.view.as_ref().and_then(|v| joints.report(v, elapsed)) {
         write(dir, "keypoints.json", &serde_json::to_vec_pretty(&found).unwrap_or_default())?;
@@ -328,7 +329,7 @@ fn fill(
         program: model.text(),
     });
     write(dir, "report.html", html.as_bytes())?;
-    let mut more = counts(&chains, &quantities);
+    let mut more = counts(&chains, best.as_deref(), &quantities);
     more.extend([("sampling_seconds".into(), json!(sampled)), ("seconds".into(), json!(elapsed))]);
     write_record(dir, record, if interrupted { "interrupted" } else { "done" }, Value::Object(more))?;
     Ok(Outcome {
@@ -355,12 +356,12 @@ fn approximate(job: &Job, chains: &[ChainResult]) -> Vec<String> {
 }
 
 /// What `run.json` says of the chains at the end.
-fn counts(chains: &[ChainResult], quantities: &[Quantity]) -> Map<String, Value> {
+fn counts(chains: &[ChainResult], best: Option<&BestState>, quantities: &[Quantity]) -> Map<String, Value> {
     let each: Vec<Value> = chains
         .iter()
         .map(|c| json!({ "steps": c.steps, "warmup": c.warmup, "draws": c.draws, "seconds": c.seconds }))
         .collect();
-    let best = chains.iter().filter_map(|c| c.best.as_ref().map(|b| b.0)).max_by(f64::total_cmp);
+    let best = best.map(|b| b.log_joint);
     let r_hat = quantities.iter().map(|q| q.summary.r_hat).filter(|r| !r.is_nan()).max_by(f64::total_cmp);
     let all = [("chains", json!(each)), ("best_log_joint", json!(best)), ("r_hat_max", json!(r_hat))];
     all.into_iter().map(|(k, v)| (k.to_owned(), v)).collect()

@@ -54,7 +54,7 @@ impl Joints {
         view.landmarks(width, height).map(|(name, at)| (Arc::clone(name), at)).collect()
     }
 
-    /// The file: means and spreads over all draws of all chains, and the best draw, that of `view`. None if it has no
+    /// The file: means and spreads over all draws of all chains, and the best state, that of `view`. None if it has no
     /// landmarks.
     pub fn report(&self, view: &ViewValue, seconds: f64) -> Option<Value> {
         let best = self.positions(view);

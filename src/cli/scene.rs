@@ -6,12 +6,20 @@ use pcadlang::lang::code::Operand;
 use pcadlang::lang::value::Value;
 use pcadlang::render::{Camera, View};
 use pcadlang::rng::{Purpose, StreamKey};
-use pcadlang::trace::{Draws, Trace};
+use pcadlang::trace::{Constraint, Draws, Trace};
+use pcadlang::{Error, Model};
 use std::sync::Arc;
 
 /// Where values that no observation asks for are drawn.
 pub fn predictive(seed: u64, step: u64) -> Draws {
     Draws { key: StreamKey::new(seed, u32::MAX, Purpose::PREDICT), step, lane: 0 }
+}
+
+/// The state of these choices.
+pub fn rebuilt(model: &Model, choices: &[(u64, Constraint)], draws: Draws) -> Result<Trace, Error> {
+    let (code, limits) = (Arc::clone(model.code()), model.limits().clone());
+    let built = Trace::generate(code, choices.iter().cloned(), draws, limits);
+    built.map(|(trace, _)| trace).map_err(|e| model.run_error(*e))
 }
 
 /// Where a program keeps its view: the last top-level name that is one.

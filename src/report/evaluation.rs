@@ -69,7 +69,7 @@ pub struct Row {
     pub seconds: Option<f64>,
     /// Wall time until every file was written.
     pub wall_seconds: Option<f64>,
-    /// The log joint density of the best draw.
+    /// The log joint density of the best state.
     pub best_log_joint: Option<f64>,
     /// The largest R-hat of any recorded quantity.
     pub r_hat_max: Option<f64>,

@@ -265,6 +265,6 @@ pub(super) const TABLE: &[Row] = &[
         MONITORS,
         &[arg("x", Type::Any, "An expression of the model.")],
         Type::Any,
-        "Its value in the draw with the highest log joint density.",
+        "Its value in the state with the highest log joint density.",
     ),
 ];

@@ -26,7 +26,7 @@ pub struct Page<'a> {
     pub kernels: &'a [KernelStats],
     /// What a reader should know first.
     pub warnings: &'a [String],
-    /// The mesh of the best draw.
+    /// The mesh of the best state.
     pub mesh: Option<MeshData<'a>>,
     /// The program's text.
     pub program: &'a str,
@@ -90,7 +90,7 @@ fn pictures(s: &mut String, p: &Page) {
         let _ = writeln!(
             s,
             "<figure><canvas id=\"mesh\" width=\"384\" height=\"384\" tabindex=\"0\"></canvas>\
-             <figcaption>the best draw; drag to turn it, wheel to come closer, double click to go back</figcaption></figure>\n\
+             <figcaption>the best state; drag to turn it, wheel to come closer, double click to go back</figcaption></figure>\n\
              <script type=\"application/json\" id=\"mesh-data\">{{\"positions\":[{}],\"triangles\":[{}]}}</script>\n\
              <script>\n{VIEWER}</script>",
             coordinates(m.positions),
