@@ -11,10 +11,13 @@ use pcadlang::rng::{Purpose, StreamKey};
 use pcadlang::syntax::span::{FileId, Span};
 use pcadlang::trace::{Draws, Target, Trace};
 use serde_json::{Value, json};
-use std::collections::BTreeMap;
+use std::collections::{BTreeMap, HashSet};
 
-/// Proposals that are tried of each group: what a thread keeps of pictures is made by the first ones.
-const TRIES: u64 = 4;
+/// Proposals that draw something that are wanted of each group: what a thread keeps of pictures is made by the first ones.
+const WANTED: u32 = 4;
+
+/// Proposals that are tried for them: a choice that comes out as it was draws nothing.
+const TRIES: u64 = 64;
 
 /// Choices whose addresses differ in keys only.
 struct Group {
@@ -63,7 +66,7 @@ pub fn explain(model: &Model, o: &Outcome, seed: u64) -> Explanation {
     let plan = model.plan().map(|(plan, _)| plan).unwrap_or_default();
     for kernel in selecting(&code, &plan, &mut trace) {
         let selection = trace.select(&kernel.selector);
-        let chosen = trace.targets(selection).to_vec();
+        let chosen: HashSet<Target> = trace.targets(selection).iter().copied().collect();
         for (group, targets) in groups.values_mut() {
             if targets.iter().any(|t| chosen.contains(t)) {
                 group.kernels.push(kernel.kernel.clone());
@@ -89,13 +92,21 @@ pub fn explain(model: &Model, o: &Outcome, seed: u64) -> Explanation {
 
 /// What a proposal of a choice draws, once what stays is known.
 fn drawn_by(trace: &mut Trace, t: Target, seed: u64) -> Option<Work> {
-    let mut last = None;
+    let (mut last, mut drawing): (Option<Work>, u32) = (None, 0);
     for step in 0..TRIES {
         let draws = Draws { key: StreamKey::new(seed, 0, Purpose::PREDICT), step, lane: 0 };
         let before = work();
         let done = trace.regenerate(&[t], draws).is_ok();
         trace.rollback();
-        last = Some(work() - before).filter(|_| done).or(last);
+        let spent = work() - before;
+        let draws_some = spent.whole + spent.partial > 0;
+        if done && (draws_some || drawing == 0) {
+            last = Some(spent);
+            drawing += u32::from(draws_some);
+        }
+        if drawing == WANTED {
+            break;
+        }
     }
     last
 }

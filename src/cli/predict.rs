@@ -2,14 +2,14 @@
 //! are the library's ([`pcadlang::infer::predictive`]); here they become a table and a file.
 
 use super::args::{Job, Predict};
-use super::job::{self, Interrupt, write};
+use super::job::{self, Interrupt, Ready, write};
 use super::progress::{self, Ending};
 use super::{Failure, plain, quality};
+use pcadlang::Model;
 use pcadlang::infer::draws::{Discard, Sink};
 use pcadlang::infer::predictive::{Predictive, Replication, STATISTICS, observed, prior, statistics, tail};
 use pcadlang::infer::{Progress, diagnostics};
 use pcadlang::report::{RunDir, number, seconds, table};
-use pcadlang::{Model, RunOptions};
 use std::fmt::Write;
 use std::path::Path;
 use std::sync::Arc;
@@ -29,7 +29,7 @@ pub fn predict(a: &Predict) -> Result<(), Failure> {
     let model = &ready.model;
     let (what, draws) = match a.prior {
         true => ("prior", vec![from_prior(a, model)?]),
-        false => ("posterior", from_posterior(job, model)?),
+        false => ("posterior", from_posterior(job, &ready)?),
     };
     let now = observed(&model.simulate(a.job.sampling.seed, 0)?);
     let silent: Vec<&(String, String)> =
@@ -61,18 +61,10 @@ fn from_prior(a: &Predict, model: &Model) -> Result<Vec<Replication>, Failure> {
     drawn.map_err(|e| model.chain_error(e).into())
 }
 
-fn from_posterior(job: &Job, model: &Model) -> Result<Vec<Vec<Replication>>, Failure> {
-    let s = &job.sampling;
+fn from_posterior(job: &Job, ready: &Ready) -> Result<Vec<Vec<Replication>>, Failure> {
+    let (s, model) = (&job.sampling, &ready.model);
     let watch = Predictive::new(s.chains(), s.seed);
-    let options = RunOptions {
-        seed: s.seed,
-        steps: s.steps,
-        warmup: s.warmup,
-        time: s.time,
-        incremental: !s.no_incremental,
-        watch: Some(Arc::new(watch.clone())),
-        ..RunOptions::default()
-    };
+    let options = job::options(job, ready, Some(Arc::new(watch.clone())));
     let sinks = (0..s.chains()).map(|_| Box::new(Discard) as Box<dyn Sink>).collect();
     let (progress, ending) = (Arc::new(Progress::default()), Ending::default());
     let interrupt = Interrupt::listen();

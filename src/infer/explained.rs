@@ -61,14 +61,7 @@ impl Reader<'_, '_> {
                 return;
             }
             self.within.push(declared.name.node.clone());
-            let moved = declared.body.iter().filter_map(|s| match &s.kind {
-                KStmtKind::Propose { target, .. } | KStmtKind::Map { target, .. } => Some(target),
-                _ => None,
-            });
-            for target in moved.filter(|t| matches!(t.kind, ExprKind::Address(_))) {
-                let selector = selector(target, &mut self.env).unwrap_or(Selector::All);
-                self.add(print_expr(e), selector);
-            }
+            self.moved(e, &declared.body);
             self.statements(&declared.body);
             self.within.pop();
             return;
@@ -90,6 +83,22 @@ impl Reader<'_, '_> {
         }
         if !selected {
             self.add(print_expr(e), Selector::All);
+        }
+    }
+
+    /// What a declared kernel, called by `e`, proposes itself.
+    fn moved(&mut self, e: &Expr, body: &[KStmt]) {
+        for statement in body {
+            match &statement.kind {
+                KStmtKind::For { body, .. } => self.moved(e, body),
+                KStmtKind::Propose { target, .. } | KStmtKind::Map { target, .. }
+                    if matches!(target.kind, ExprKind::Address(_)) =>
+                {
+                    let selector = selector(target, &mut self.env).unwrap_or(Selector::All);
+                    self.add(print_expr(e), selector);
+                }
+                _ => {}
+            }
         }
     }
 
