@@ -17,13 +17,17 @@ fn table(f: &Folder) -> Vec<Value> {
 
 fn mean_cases(f: &Folder) {
     f.write("mean.pcad", MEAN);
-    for (name, y) in [("a", 2.0), ("b", -1.0)] {
+    cases(f, &[("a", 2.0), ("b", -1.0)]);
+    f.write("few.json", r#"{"base": {"chains": 2}, "vary": {"n": [2, 100, 20000]}}"#);
+}
+
+fn cases(f: &Folder, all: &[(&str, f64)]) {
+    for (name, y) in all {
         std::fs::create_dir_all(f.path().join("cases").join(name)).unwrap();
         f.write(&format!("cases/{name}/d.json"), json!({ "y": y }).to_string());
         let reference = json!({ "x": { "mean": 0.8 * y, "sd": 0.2f64.sqrt() } });
         f.write(&format!("cases/{name}/reference.json"), reference.to_string());
     }
-    f.write("few.json", r#"{"base": {"chains": 2}, "vary": {"n": [2, 100, 20000]}}"#);
 }
 
 fn tradeoff(f: &Folder, more: &[&str]) -> folder::Done {
@@ -86,22 +90,42 @@ fn what_was_run_is_not_run_again() {
     let failing = tradeoff(&f, &["--only", "a", "--out", "fails"]);
     assert!(failing.code == 1 && failing.err.contains("all 5 runs failed"), "{}", failing.err);
     f.write("mean.pcad", MEAN);
-    // Other cases, another program: what is there is of something else.
-    let other = tradeoff(&f, &[]);
-    assert!(other.code == 1 && other.err.contains("cases is not what it was"), "{}", other.err);
-    assert_eq!(f.read("tradeoff/runs.jsonl"), after);
+    assert_eq!(tradeoff(&f, &["--only", "a", "--out", "fails"]).code, 1, "another program");
+    // Other cases, another program, another answer: what is there is of something else.
+    let refused = |more: &[&str], what: &str| {
+        let done = tradeoff(&f, more);
+        assert!(done.code == 1 && done.err.contains(&format!("{what} is not what it was")), "{}", done.err);
+        assert_eq!(f.read("tradeoff/runs.jsonl"), after);
+    };
+    refused(&[], "cases");
+    f.write("mean.pcad", MEAN.replace("0.5", "0.6"));
+    refused(&["--only", "a"], "programs");
+    f.write("mean.pcad", MEAN);
+    f.write("cases/a/reference.json", r#"{"x": {"mean": 1.5, "sd": 0.4}}"#);
+    refused(&["--only", "a"], "inputs");
     assert_eq!(tradeoff(&f, &["--fresh"]).code, 0);
+    // A quantity that no run records is a mistake, not an error of 2.2.
+    f.write("cases/a/reference.json", r#"{"y": {"mean": 1.5, "sd": 0.4}}"#);
+    let misspelt = tradeoff(&f, &["--only", "a", "--out", "misspelt"]);
+    let said = "the reference has `y`, which the program does not collect";
+    assert!(misspelt.code == 1 && misspelt.err.contains(said), "{}", misspelt.err);
 }
 
 #[test]
 fn a_short_budget_leaves_out_settings_and_says_so() {
     let f = Folder::new("tradeoff_budget");
     mean_cases(&f);
-    let none = tradeoff(&f, &["--budget", "1ms"]);
+    cases(&f, &[("c", 0.5), ("d", 1.0), ("e", 1.5), ("f", -2.0)]);
+    let none = tradeoff(&f, &["--budget", "1ms", "--jobs", "1"]);
     assert!(none.code == 1 && none.err.contains("the budget is used up"), "{}", none.err);
-    // Six runs of ten seconds at most each are thought to take a minute; half of that is enough for two rounds.
-    let half = tradeoff(&f, &["--budget", "45s", "--jobs", "1"]);
-    assert!(half.code == 0 && half.err.contains("round 1 of"), "{}", half.err);
+    // Twenty-four runs that are thought to take eleven seconds each; four minutes are enough for all settings on three cases, half of
+    // them on six.
+    let half = tradeoff(&f, &["--budget", "4m", "--jobs", "1"]);
+    assert!(half.code == 0 && half.err.contains("round 2 of"), "{}", half.err);
+    let ends: Vec<Value> = table(&f).into_iter().filter(|r| r["end"] == true).collect();
+    let through = ends.iter().filter(|r| r["cases"] == json!(6)).count();
+    assert_eq!((through, ends.len()), (2, 4), "{ends:?}");
+    assert!(ends.iter().all(|r| r["front"] == false || r["cases"] == json!(6)));
 }
 
 #[test]

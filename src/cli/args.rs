@@ -244,9 +244,9 @@ pub struct Tradeoff {
     /// The cases: a folder for each, with what is observed and the known answer
     #[arg(long, value_name = "DIR")]
     pub cases: PathBuf,
-    /// The settings to try, as JSON; PROG with the ending .settings.json if left out
+    /// The settings to try, as JSON, also several times; PROG with the ending .settings.json if left out
     #[arg(long, value_name = "FILE")]
-    pub settings: Option<PathBuf>,
+    pub settings: Vec<PathBuf>,
     /// Detected keypoints of the cases: {CASE: {"keypoints": {NAME: [x, y, …], …}}, …}
     #[arg(long, value_name = "FILE")]
     pub keypoints: Option<PathBuf>,
@@ -287,7 +287,7 @@ gt.npz with arrays of these names; or one of the people of annotations.json, its
 with reference.json, {QUANTITY: {\"mean\": …, \"sd\": …}, …}, and a file called like each `data` item, such as y.csv.
 
 Settings: {\"base\": {\"chains\": 4, \"size\": 128}, \"cross\": {\"time\": [1, 3]}, \"vary\": {\"size\": [64], \"chains\": [1, 2]}}
-Each value of `cross` with each change of `vary`, one at a time; `also` is a list of more, `random` a number of random ones. Names other
+Each value of `cross` with each change of `vary`, one at a time; `also` is a list of more, `random` a number of random ones; with `compare: true` none becomes a preset. Names other
 than program, chains, time, steps and warmup are parameters of the program.";
 
 /// `sample`.

@@ -9,16 +9,16 @@ use pcadlang::tradeoff::{Choice, Presets, Quality};
 use std::path::Path;
 use std::time::Duration;
 
-/// What is known of a program: `NAME.quality.json` beside it, or the shipped one of a shipped program.
+/// What is known of a program: `NAME.quality.json` beside it; or, of a shipped program, the shipped one.
 pub fn presets(program: &str) -> Result<Option<(String, Presets)>, Failure> {
     let path = Path::new(program).with_extension("quality.json");
     let name = path.display().to_string();
-    let text = match Path::new(program).exists() {
-        true => std::fs::read_to_string(&path).ok(),
-        false => load::embedded(&name).map(str::to_owned),
-    };
-    let read = |text: String| serde_json::from_str(&text).map_err(|e| plain(format!("{name}: {e}")));
-    text.map(read).transpose().map(|p| p.map(|p| (name, p)))
+    let shipped = || load::embedded(&name).filter(|_| !Path::new(program).exists()).map(str::to_owned);
+    let Some(text) = std::fs::read_to_string(&path).ok().or_else(shipped) else { return Ok(None) };
+    let wrong = |e: &dyn std::fmt::Display| plain(format!("{name}: {e}"));
+    let presets: Presets = serde_json::from_str(&text).map_err(|e| wrong(&e))?;
+    presets.front.iter().try_for_each(|p| p.setting.check()).map_err(|e| wrong(&e))?;
+    Ok(Some((name, presets)))
 }
 
 /// Fills in what a run leaves open; what is to be said of it, if anything was. `keypoints`: whether it, or the dataset it is of, has some.
@@ -71,9 +71,20 @@ fn fill(job: &mut Job, choice: &Choice, name: &str) -> String {
         s.chains = Some(chains);
         said.push(format!("--chains {chains}"));
     }
-    if let (None, None, Some(time)) = (s.time, s.steps, setting.time) {
-        s.time = Some(Duration::from_secs_f64(time));
-        said.push(format!("--time {time}s"));
+    // How long is one question: whoever answers it in one way is not told another.
+    if let (None, None) = (s.time, s.steps) {
+        if let Some(time) = setting.time {
+            s.time = Some(Duration::from_secs_f64(time));
+            said.push(format!("--time {time}s"));
+        }
+        if let Some(steps) = setting.steps {
+            s.steps = Some(steps);
+            said.push(format!("--steps {steps}"));
+        }
+    }
+    if let (None, Some(warmup)) = (s.warmup, setting.warmup) {
+        s.warmup = Some(warmup);
+        said.push(format!("--warmup {warmup}"));
     }
     let [low, high] = choice.preset.interval;
     let (error, cases) = (choice.preset.error, choice.preset.cases);
@@ -137,6 +148,20 @@ mod tests {
         told.sampling.chains = Some(3);
         fill(&mut told, &presets.of_time(5.0).unwrap(), "x.quality.json");
         assert_eq!((told.sampling.chains(), told.sampling.time), (3, Some(Duration::from_secs(5))));
+    }
+
+    #[test]
+    fn all_that_was_measured_is_filled_in() {
+        let text = r#"{"about": "", "error": "", "front": [
+            {"steps": 200, "warmup": 50, "seconds": 1.1, "error": 0.3, "interval": [0.2, 0.4], "cases": 3}]}"#;
+        let presets: Presets = serde_json::from_str(text).unwrap();
+        let mut open = job(None, None);
+        fill(&mut open, &presets.of_quality(Quality::Fast).unwrap(), "x.quality.json");
+        assert_eq!((open.sampling.steps, open.sampling.warmup, open.sampling.time), (Some(200), Some(50), None));
+        let mut told = job(None, Some(2.0));
+        told.sampling.warmup = Some(7);
+        fill(&mut told, &presets.of_time(2.0).unwrap(), "x.quality.json");
+        assert_eq!((told.sampling.steps, told.sampling.warmup), (None, Some(7)));
     }
 
     #[test]

@@ -32,11 +32,16 @@ impl JointsTruth {
         (!known.is_empty()).then(|| known.iter().sum::<f64>() / known.len() as f64)
     }
 
+    /// Whether there is a limb joint to be found, and a torso to measure by.
+    pub fn is_enough(&self) -> bool {
+        self.torso().is_some() && limbs().any(|name| self.joints.contains_key(&name))
+    }
+
     /// How far found joints are off. A joint that was not found counts as missed; without a torso all of them do.
     pub fn error(&self, found: &IndexMap<String, [f64; 2]>) -> JointsError {
         let torso = self.torso();
         let (mut error, mut sum, mut seen) = (JointsError { labelled: 0, missed: 0, pixels: f64::NAN }, 0.0, 0u32);
-        for name in PARTS.iter().flat_map(|p| ["l_", "r_"].map(|side| format!("{side}{p}"))) {
+        for name in limbs() {
             let Some(truth) = self.joints.get(&name) else { continue };
             let d = found.get(&name).map(|at| distance(truth, at)).filter(|d| d.is_finite());
             error.labelled += 1;
@@ -50,6 +55,11 @@ impl JointsTruth {
         }
         error
     }
+}
+
+/// The names of all limb joints.
+fn limbs() -> impl Iterator<Item = String> {
+    PARTS.iter().flat_map(|p| ["l_", "r_"].map(|side| format!("{side}{p}")))
 }
 
 fn distance(a: &[f64; 2], b: &[f64; 2]) -> f64 {
@@ -83,5 +93,6 @@ mod tests {
     fn without_a_torso_nothing_is_found() {
         let truth = JointsTruth { joints: joints(&[("l_knee", [0.0, 90.0])]) };
         assert_eq!(truth.error(&truth.joints).missed, 1);
+        assert!(!truth.is_enough());
     }
 }

@@ -67,8 +67,9 @@ impl SurfaceTruth {
         for i in 0..truth.depth.len() {
             let there = found.filter(|f| !f.depth.is_empty()).map(|f| {
                 let (x, y) = (i % truth.width.max(1), i / truth.width.max(1));
-                let across = x * f.width / truth.width.max(1);
-                (f, y * rows(f) / rows(truth).max(1) * f.width + across)
+                // The pixel that holds the middle of this one.
+                let nearest = |at: usize, to: usize, of: usize| (2 * at + 1) * to / (2 * of.max(1));
+                (f, nearest(y, rows(f), rows(truth)) * f.width + nearest(x, f.width, truth.width))
             });
             match (truth.seen(i), there.and_then(|(f, j)| Some((f, j, f.seen(j)?)))) {
                 (Some(z), Some((f, j, found))) => both.push((z - found, normal_gap(truth, i, f, j))),

@@ -35,14 +35,16 @@ fn runs_of(rounds: &[Round]) -> usize {
     rounds.iter().enumerate().map(|(i, r)| r.settings * (r.cases.saturating_sub(before(i)))).sum()
 }
 
-/// The settings that go on: those that come first at some time. A setting is as good as its best rank over all times at which it was looked
-/// at, among the settings that were too; of equals, the one of smaller mean rank.
+/// The settings that go on: those that come first at some time. A setting is as good as its best rank over all times at which it and
+/// others were looked at; of equals, the one of smaller mean rank. A run that failed is worse than any other. `runs` are of the same cases
+/// for all settings.
 pub fn survivors(settings: &[String], runs: &[RunRecord], keep: usize) -> Vec<String> {
     // Errors by time and setting.
     let mut errors: IndexMap<i64, IndexMap<&str, Vec<f64>>> = IndexMap::new();
-    for run in runs.iter().filter(|r| settings.contains(&r.setting)) {
+    let failed = |setting: &str| runs.iter().any(|r| r.setting == setting && r.failed.is_some());
+    for run in runs.iter().filter(|r| settings.contains(&r.setting) && !failed(&r.setting)) {
         for mark in &run.marks {
-            // The end of a run competes at the last time before it.
+            // The end of a run competes at the nearest time at which others are looked at.
             let at = mark.at.unwrap_or(mark.seconds);
             let time = (at.max(1e-3).log10() * 4.0).round() as i64;
             let errors = errors.entry(time).or_default().entry(&run.setting).or_default();
@@ -50,15 +52,15 @@ pub fn survivors(settings: &[String], runs: &[RunRecord], keep: usize) -> Vec<St
         }
     }
     let mut ranks: IndexMap<&str, Vec<usize>> = settings.iter().map(|s| (s.as_str(), Vec::new())).collect();
-    for at in errors.values() {
+    for at in errors.values().filter(|at| at.len() > 1) {
         let mean = |xs: &Vec<f64>| if xs.is_empty() { f64::INFINITY } else { xs.iter().sum::<f64>() / xs.len() as f64 };
         let mut order: Vec<(&str, f64)> = at.iter().map(|(s, xs)| (*s, mean(xs))).collect();
         order.sort_by(|a, b| a.1.total_cmp(&b.1));
         for (rank, (setting, error)) in order.iter().enumerate() {
-            // Equal errors have equal ranks.
-            let first = order.iter().position(|o| o.1 == *error).unwrap_or(rank);
+            // Equals all come last among them: when nobody has an answer yet, nobody is first.
+            let last = order.iter().rposition(|o| o.1 == *error).unwrap_or(rank);
             if let Some(all) = ranks.get_mut(setting) {
-                all.push(first);
+                all.push(last);
             }
         }
     }
@@ -106,5 +108,17 @@ mod tests {
         assert_eq!(survivors(&all, &runs, 2), ["early", "late"]);
         assert_eq!(survivors(&all, &runs, 3), ["never", "early", "late"]);
         assert_eq!(survivors(&all, &[], 4), all);
+
+        // Before there is an answer all are equal, and alone one is not first; a run that failed counts against its setting.
+        let runs = [
+            run("early", &[(0.1, 1.0), (1.0, 0.5)]),
+            run("late", &[(0.1, 1.0), (1.0, 0.1)]),
+            run("never", &[(0.1, 1.0), (1.0, 0.6)]),
+            run("worst", &[(0.1, 1.0), (1.0, 0.9), (10.0, 0.8)]),
+        ];
+        assert_eq!(survivors(&all, &runs, 1), ["late"]);
+        assert_eq!(survivors(&all, &runs, 3), ["never", "early", "late"]);
+        let failed = RunRecord { setting: "late".into(), failed: Some("no".into()), ..RunRecord::default() };
+        assert_eq!(survivors(&all, &[&runs[..], &[failed]].concat(), 1), ["early"]);
     }
 }

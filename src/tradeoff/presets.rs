@@ -1,6 +1,6 @@
 //! Settings chosen from a front, by name and by the time there is, with what they were chosen from.
 
-use super::rows::Row;
+use super::rows::{self, Row};
 use super::setting::Setting;
 use serde::{Deserialize, Serialize};
 
@@ -78,24 +78,26 @@ pub struct Choice<'a> {
     pub wanted: String,
 }
 
-impl Presets {
-    /// From a table of settings.
-    pub fn of(settings: &[Setting], rows: &[Row], about: String, error: String, needs: Vec<String>) -> Presets {
-        let mut front: Vec<Preset> = Vec::new();
-        for row in rows.iter().filter(|r| r.front) {
-            let Some(setting) = settings.iter().find(|s| s.name() == row.setting) else { continue };
-            front.push(Preset {
-                setting: setting.clone(),
-                seconds: rounded(row.seconds),
-                error: rounded(row.error),
-                interval: [rounded(row.low), rounded(row.high)],
-                cases: row.cases,
-            });
-        }
+impl Preset {
+    /// The front of some settings, by a table that may have others, too.
+    pub fn front(settings: &[Setting], rows: &[Row]) -> Vec<Preset> {
+        let own = |row: &Row| settings.iter().find(|s| s.name() == row.setting);
+        let (rows, settings): (Vec<Row>, Vec<&Setting>) =
+            rows.iter().filter_map(|r| Some((r.clone(), own(r)?))).unzip();
+        let preset = |i: usize| Preset {
+            setting: settings[i].clone(),
+            seconds: rounded(rows[i].seconds),
+            error: rounded(rows[i].error),
+            interval: [rounded(rows[i].low), rounded(rows[i].high)],
+            cases: rows[i].cases,
+        };
+        let mut front: Vec<Preset> = rows::front(&rows).into_iter().map(preset).collect();
         front.sort_by(|a, b| a.seconds.total_cmp(&b.seconds));
-        Presets { about, error, needs, front }
+        front
     }
+}
 
+impl Presets {
     /// The setting of a name; `None` if the front is empty.
     pub fn of_quality(&self, quality: Quality) -> Option<Choice<'_>> {
         let least = self.front.iter().map(|p| p.error).min_by(f64::total_cmp)?;
@@ -118,6 +120,7 @@ fn rounded(x: f64) -> f64 {
 
 #[cfg(test)]
 mod tests {
+    use super::super::runs::{Mark, RunRecord};
     use super::*;
 
     fn presets(all: &[(f64, f64)]) -> Presets {
@@ -138,6 +141,23 @@ mod tests {
         assert_eq!(Quality::ALL.map(|q| time(p.of_quality(q))), [1.0, 3.0, 30.0]);
         assert_eq!([0.1, 0.5, 2.0, 5.0, 100.0].map(|t| time(p.of_time(t))), [0.5, 0.5, 1.0, 3.0, 30.0]);
         assert!(presets(&[]).of_quality(Quality::Fast).is_none());
+    }
+
+    #[test]
+    fn others_in_the_table_are_passed_over() {
+        let own = Setting { time: Some(2.0), ..Setting::default() };
+        let other = Setting { program: Some("b.pcad".into()), time: Some(1.0), ..Setting::default() };
+        let run = |setting: &Setting, error: f64| RunRecord {
+            setting: setting.name(),
+            marks: vec![Mark { at: None, seconds: setting.time.unwrap(), error: Some(error) }],
+            ..RunRecord::default()
+        };
+        let settings = [own.clone(), other.clone()];
+        // The other one beats it, and is on the front of the table.
+        let table = rows::rows(&settings, &[run(&own, 0.2), run(&other, 0.1)]);
+        assert_eq!(table.iter().map(|r| r.front).collect::<Vec<_>>(), [false, true]);
+        let front = Preset::front(std::slice::from_ref(&own), &table);
+        assert_eq!(front.iter().map(|p| (&p.setting, p.error)).collect::<Vec<_>>(), [(&own, 0.2)]);
     }
 
     #[test]

@@ -32,12 +32,12 @@ pub struct Row {
     pub scores: IndexMap<String, f64>,
     /// Effective draws a second, the median over runs, where it is known.
     pub ess_per_second: Option<f64>,
-    /// Whether no other setting that has been through all cases is as quick and better; among ends only.
+    /// Whether it is on the front.
     pub front: bool,
 }
 
-/// The table: every setting at every time it was looked at, in the order of the settings. `cases` is how many there are.
-pub fn rows(settings: &[Setting], runs: &[RunRecord], cases: usize) -> Vec<Row> {
+/// The table: every setting at every time it was looked at, in the order of the settings.
+pub fn rows(settings: &[Setting], runs: &[RunRecord]) -> Vec<Row> {
     let mut all = Vec::new();
     for name in settings.iter().map(Setting::name) {
         let of: Vec<&RunRecord> = runs.iter().filter(|r| r.setting == name).collect();
@@ -46,7 +46,7 @@ pub fn rows(settings: &[Setting], runs: &[RunRecord], cases: usize) -> Vec<Row> 
         times.dedup();
         all.extend(times.into_iter().filter_map(|at| row(&name, at, &of)));
     }
-    let front = front(&all, cases);
+    let front = front(&all);
     for i in front {
         all[i].front = true;
     }
@@ -90,10 +90,12 @@ fn row(name: &str, at: Option<f64>, runs: &[&RunRecord]) -> Option<Row> {
     })
 }
 
-/// The Pareto front, from the quickest to the most accurate: ends of settings that have been through all cases, and that none of the
-/// others is as quick as and better.
-pub fn front(rows: &[Row], cases: usize) -> Vec<usize> {
-    let mut ends: Vec<usize> = (0..rows.len()).filter(|&i| rows[i].end && rows[i].cases == cases).collect();
+/// The Pareto front, from the quickest to the most accurate: ends of settings that have been through as many cases as any, never failed,
+/// and that none of the others is as quick as and better.
+pub fn front(rows: &[Row]) -> Vec<usize> {
+    let mut ends: Vec<usize> = (0..rows.len()).filter(|&i| rows[i].end && rows[i].failed == 0).collect();
+    let most = ends.iter().map(|&i| rows[i].cases).max();
+    ends.retain(|&i| Some(rows[i].cases) == most);
     // Runs of one time differ by hundredths of it.
     let time = |i: usize| (rows[i].seconds.max(1e-9).ln() * 20.0).round();
     ends.sort_by(|&a, &b| time(a).total_cmp(&time(b)).then(rows[a].error.total_cmp(&rows[b].error)));
@@ -158,17 +160,19 @@ mod tests {
     }
 
     #[test]
-    fn the_front_is_of_ends_through_all_cases() {
+    fn the_front_is_of_ends_through_most_cases() {
         let both = |s: &str, marks: &[(Option<f64>, f64, f64)]| [run(s, "a", marks), run(s, "b", marks)];
         let mut runs = Vec::new();
         runs.extend(both("time=1", &[(Some(0.1), 0.1, 0.01), (None, 1.0, 0.5)]));
         runs.extend(both("time=2", &[(None, 2.0, 0.6)]));
         runs.extend(both("time=3", &[(None, 3.0, 0.2)]));
         runs.push(run("time=4", "a", &[(None, 4.0, 0.0)]));
-        let table = rows(&[setting(1.0), setting(2.0), setting(3.0), setting(4.0)], &runs, 2);
+        runs.extend(both("time=5", &[(None, 5.0, 0.1)]));
+        runs.push(RunRecord { setting: "time=5".into(), failed: Some("no".into()), ..RunRecord::default() });
+        let table = rows(&[1.0, 2.0, 3.0, 4.0, 5.0].map(setting), &runs);
         let on: Vec<&str> = table.iter().filter(|r| r.front).map(|r| r.setting.as_str()).collect();
         assert_eq!(on, ["time=1", "time=3"]);
-        assert_eq!(table.len(), 5);
+        assert_eq!(table.len(), 6);
         assert_eq!((table[0].end, table[0].seconds, table[1].end), (false, 0.1, true));
         assert_eq!((table[4].cases, table[4].runs), (1, 1));
     }
@@ -179,6 +183,6 @@ mod tests {
         one.scores.insert("iou".into(), 0.75);
         let expected = "setting,end,seconds,error,low,high,cases,runs,failed,ess_per_second,front,iou\n\
                         \"time=1\",true,1.000,0.500000,0.500000,0.500000,1,1,0,,true,0.750000\n";
-        assert_eq!(to_csv(&rows(&[setting(1.0)], &[one], 1)), expected);
+        assert_eq!(to_csv(&rows(&[setting(1.0)], &[one])), expected);
     }
 }

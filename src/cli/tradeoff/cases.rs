@@ -5,7 +5,7 @@
 use super::truth::{self, Truth};
 use crate::cli::args::Tradeoff;
 use crate::cli::evaluate::{Dataset, Detections, Items, Layout, observations_for};
-use crate::cli::{Failure, files, plain};
+use crate::cli::{Failure, files, given, plain};
 use pcadlang::Program;
 use std::path::{Path, PathBuf};
 
@@ -19,6 +19,16 @@ pub struct Case {
     pub camera: Option<PathBuf>,
     /// The answer.
     pub truth: Truth,
+    /// The files that say it.
+    said: Vec<PathBuf>,
+}
+
+impl Case {
+    /// All files that what is measured depends on.
+    pub fn files(&self) -> impl Iterator<Item = PathBuf> {
+        let observed = self.observe.iter().map(|spec| PathBuf::from(given::file_of(spec)));
+        observed.chain(self.camera.clone()).chain(self.said.clone())
+    }
 }
 
 /// The posterior that a case without a picture is compared with.
@@ -39,13 +49,18 @@ pub fn open(a: &Tradeoff, program: &Program) -> Result<Vec<Case>, Failure> {
     };
     let mut all = Vec::new();
     for case in cases {
-        let found = match &mut truths {
-            Some(people) => people.shift_remove(&case.name).map(Truth::Joints),
-            None => truth::surface(&a.cases.join(&case.name), case.camera.as_deref())?.map(Truth::Surface),
+        let camera = case.camera.clone().or_else(|| a.given.camera.clone());
+        let folder = a.cases.join(&case.name);
+        let (found, said) = match &mut truths {
+            Some(people) => (people.shift_remove(&case.name).map(Truth::Joints), vec![a.cases.join(truth::LABELS)]),
+            None => (
+                truth::surface(&folder, camera.as_deref())?.map(Truth::Surface),
+                truth::SURFACE.iter().map(|name| folder.join(name)).filter(|p| p.is_file()).collect(),
+            ),
         };
         let Some(truth) = found else { continue };
         let observe = observations_for(&case, detections.as_ref()).iter().map(|o| items.spec(o)).collect();
-        all.push(Case { name: case.name, observe, camera: case.camera.or_else(|| a.given.camera.clone()), truth });
+        all.push(Case { name: case.name, observe, camera, truth, said });
     }
     match all.is_empty() {
         true => Err(Failure::Plain(
@@ -71,19 +86,20 @@ fn folders(path: &Path) -> Result<Vec<PathBuf>, Failure> {
 fn posterior(folder: &Path, program: &Program) -> Result<Case, Failure> {
     let name = folder.file_name().and_then(|n| n.to_str()).unwrap_or("case").to_owned();
     let data = program.interface().data;
-    let mut given: Vec<PathBuf> = std::fs::read_dir(folder)
+    let mut there: Vec<PathBuf> = std::fs::read_dir(folder)
         .map_err(|e| plain(format!("{}: {e}", folder.display())))?
         .filter_map(|e| Some(e.ok()?.path()))
-        .filter(|p| p.is_file())
+        // The truth is not for the program, whatever it calls its data.
+        .filter(|p| p.is_file() && !p.ends_with(REFERENCE))
         .collect();
-    given.sort();
+    there.sort();
     let item = |path: &PathBuf| {
         let stem = path.file_stem()?.to_str()?;
         data.iter().find(|d| d.name == stem).map(|d| format!("{}={}", d.name, path.display()))
     };
-    let observe = given.iter().filter_map(item).collect();
+    let observe = there.iter().filter_map(item).collect();
     let path = folder.join(REFERENCE);
     let text = files::read(&path)?;
     let truth = truth::reference(&text).map_err(|e| plain(format!("{}: {e}", path.display())))?;
-    Ok(Case { name, observe, camera: None, truth: Truth::Posterior(truth) })
+    Ok(Case { name, observe, camera: None, truth: Truth::Posterior(truth), said: vec![path] })
 }

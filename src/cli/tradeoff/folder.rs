@@ -42,18 +42,18 @@ impl Folder {
                     path.display()
                 )));
             }
-            Some(_) if fresh => std::fs::write(&journal, b"").map_err(fails)?,
+            Some(_) if fresh => whole(&journal, &[])?,
             Some(other) => {
-                if let Some((key, _)) = head.iter().find(|(k, v)| other[k.as_str()] != **v) {
+                if let Some((key, _)) = head.iter().find(|(k, v)| !agrees(k, v, &other[k.as_str()])) {
                     let hint = "choose another folder with --out, or measure everything anew with --fresh";
                     let message = format!("{}: {key} is not what it was", path.display());
                     return Err(Failure::Plain(message, Some(hint.into())));
                 }
                 let text = std::fs::read_to_string(&journal).unwrap_or_default();
-                // A line that an interruption cut off is not whole.
-                before = text.lines().filter_map(|l| serde_json::from_str(l).ok()).collect();
-                let whole: String = before.iter().map(line).collect();
-                std::fs::write(&journal, whole).map_err(fails)?;
+                // A line that an interruption cut off is not whole. What failed is tried again.
+                let runs = text.lines().filter_map(|l| serde_json::from_str(l).ok());
+                before = runs.filter(|r: &RunRecord| r.failed.is_none()).collect();
+                whole(&journal, &before)?;
                 spent = other["seconds"].as_f64().unwrap_or(0.0);
             }
             None => {}
@@ -71,14 +71,32 @@ impl Folder {
 
     /// Writes a file, whole or not at all.
     pub fn write(&self, name: &str, bytes: &[u8]) -> Result<(), Failure> {
-        let path = self.path.join(name);
-        write_file(&path, bytes).map_err(|e| plain(format!("{}: {e}", path.display())))
+        written(&self.path.join(name), bytes)
     }
 
     /// Writes what was run, and all that is made of it.
     pub fn mark(&self, head: Map<String, Value>) -> Result<(), Failure> {
         self.write(MARK, &serde_json::to_vec_pretty(&Value::Object(head)).unwrap_or_default())
     }
+}
+
+/// Whether something is as it was. Programs may be added, as settings may.
+fn agrees(key: &str, now: &Value, before: &Value) -> bool {
+    match (now, before) {
+        (Value::Object(now), Value::Object(before)) if key == "programs" => {
+            now.iter().all(|(name, hash)| before.get(name).is_none_or(|known| known == hash))
+        }
+        _ => now == before,
+    }
+}
+
+fn written(path: &Path, bytes: &[u8]) -> Result<(), Failure> {
+    write_file(path, bytes).map_err(|e| plain(format!("{}: {e}", path.display())))
+}
+
+/// Writes a journal of these runs.
+fn whole(journal: &Path, runs: &[RunRecord]) -> Result<(), Failure> {
+    written(journal, runs.iter().map(line).collect::<String>().as_bytes())
 }
 
 fn line(run: &RunRecord) -> String {

@@ -18,11 +18,11 @@ use folder::Folder;
 use pcadlang::lang::load;
 use pcadlang::report::{bytes_hash, seconds, text_hash};
 use pcadlang::tradeoff::{
-    Plan, Presets, Quality, Round, Row, RunRecord, Setting, plot, rounds, rows, survivors, to_csv,
+    Plan, Preset, Presets, Quality, Round, Row, RunRecord, Setting, plot, rounds, rows, survivors, to_csv,
 };
 use serde_json::{Map, Value, json};
 use std::collections::HashSet;
-use std::path::Path;
+use std::path::{Path, PathBuf};
 use std::sync::atomic::{AtomicUsize, Ordering};
 use std::sync::{Mutex, PoisonError};
 use std::time::Instant;
@@ -31,10 +31,15 @@ use work::Task;
 /// Threads of one run: the presets are for small machines.
 const THREADS: usize = 2;
 
+/// How much longer a run takes than its own time: compiling, scoring.
+const OVERHEAD: f64 = 1.1;
+
 /// Everything there is to measure, and what has been.
 struct Sitting<'a> {
     a: &'a Tradeoff,
     settings: Vec<Setting>,
+    /// Those that may become presets.
+    candidates: Vec<Setting>,
     cases: Vec<Case>,
     folder: Folder,
     head: Map<String, Value>,
@@ -49,11 +54,13 @@ pub fn tradeoff(a: &Tradeoff) -> Result<(), Failure> {
     let interrupt = Interrupt::listen();
     let mut s = Sitting::prepare(a)?;
     let each = s.settings.iter().map(|x| x.time.unwrap_or(10.0)).sum::<f64>() / s.settings.len().max(1) as f64;
-    let each = each * f64::from(a.seeds) / s.jobs as f64;
+    let each = OVERHEAD * each * f64::from(a.seeds) / s.jobs as f64;
     let plan = rounds(s.settings.len(), s.cases.len(), each, a.budget.as_secs_f64());
     let (mut names, mut out_of_time) = (s.settings.iter().map(Setting::name).collect::<Vec<_>>(), false);
     for (i, round) in plan.iter().enumerate() {
-        names = survivors(&names, &s.done(), round.settings);
+        // Means over the same cases for all.
+        let before = i.checked_sub(1).and_then(|i| plan.get(i)).map_or(0, |r| r.cases);
+        names = survivors(&names, &s.done_on(before), round.settings);
         let Round { settings, cases } = *round;
         s.say(&format!("round {} of {}: {settings} settings on {cases} cases", i + 1, plan.len()));
         out_of_time = !s.round(&names, cases, &interrupt)?;
@@ -85,9 +92,23 @@ impl<'a> Sitting<'a> {
     /// Everything that can be wrong is said before the first run.
     fn prepare(a: &'a Tradeoff) -> Result<Sitting<'a>, Failure> {
         let program = given::program(&a.given, a.quiet)?;
-        let (file, text) = settings_of(a)?;
-        let read = Plan::from_json(&text).and_then(|p| p.settings());
-        let settings = read.map_err(|e| plain(format!("{file}: {e}")))?;
+        let (mut settings, mut candidates): (Vec<Setting>, Vec<Setting>) = Default::default();
+        for (file, text) in settings_of(a)? {
+            let read = Plan::from_json(&text).and_then(|p| Ok((p.settings()?, p.compare)));
+            let (all, compare) = read.map_err(|e| plain(format!("{file}: {e}")))?;
+            for setting in all {
+                // A run is of the program that it is told.
+                if !compare && setting.program.is_none() && !candidates.contains(&setting) {
+                    candidates.push(setting.clone());
+                }
+                if !settings.contains(&setting) {
+                    settings.push(setting);
+                }
+            }
+        }
+        if settings.is_empty() {
+            return Err(plain("there are no settings to try: a list of `cross` is empty"));
+        }
         let mut hashes = Map::new();
         for setting in &settings {
             let name = setting.program.as_deref().unwrap_or(&a.given.program);
@@ -107,7 +128,8 @@ impl<'a> Sitting<'a> {
         let machine = job::machine_threads();
         let threads = a.threads.map_or(THREADS.min(machine), |n| n as usize);
         let jobs = a.jobs.map_or((machine / threads).max(1), |n| n as usize);
-        let inputs: String = cases.iter().flat_map(|c| &c.observe).map(|o| observed_hash(o)).collect();
+        let read = |path: &PathBuf| std::fs::read(path).map(|b| bytes_hash(&b)).unwrap_or_default();
+        let inputs: String = cases.iter().flat_map(Case::files).map(|path| read(&path)).collect();
         let head = json!({
             "version": env!("CARGO_PKG_VERSION"),
             "program": a.given.program,
@@ -120,9 +142,12 @@ impl<'a> Sitting<'a> {
             "machine_threads": machine,
         });
         let Value::Object(head) = head else { return Err(plain("no settings")) };
-        let folder = Folder::open(&a.out, &head, a.fresh)?;
+        let mut folder = Folder::open(&a.out, &head, a.fresh)?;
+        // What a sitting that was killed used up is not written, but its runs are.
+        let ran = folder.before.iter().filter_map(|r| r.marks.last()).map(|m| m.seconds).sum::<f64>();
+        folder.spent = folder.spent.max(ran / jobs as f64);
         let runs = Mutex::new(folder.before.clone());
-        let s = Sitting { a, settings, cases, folder, head, runs, begun: Instant::now(), jobs, threads };
+        let s = Sitting { a, settings, candidates, cases, folder, head, runs, begun: Instant::now(), jobs, threads };
         s.write()?;
         Ok(s)
     }
@@ -133,6 +158,14 @@ impl<'a> Sitting<'a> {
         let cases: HashSet<&str> = self.cases.iter().map(|c| c.name.as_str()).collect();
         let runs = self.runs.lock().unwrap_or_else(PoisonError::into_inner);
         runs.iter().filter(|r| names.contains(&r.setting) && cases.contains(r.case.as_str())).cloned().collect()
+    }
+
+    /// Those on the first so many cases.
+    fn done_on(&self, cases: usize) -> Vec<RunRecord> {
+        let first: HashSet<&str> = self.cases.iter().take(cases).map(|c| c.name.as_str()).collect();
+        let mut runs = self.done();
+        runs.retain(|r| first.contains(r.case.as_str()) && r.seed <= u64::from(self.a.seeds));
+        runs
     }
 
     /// Seconds of the budget that are used up.
@@ -180,7 +213,7 @@ impl<'a> Sitting<'a> {
 
     /// The table of all that was run.
     fn rows(&self) -> Vec<Row> {
-        rows(&self.settings, &self.done(), self.cases.len())
+        rows(&self.settings, &self.done())
     }
 
     fn error_name(&self) -> &'static str {
@@ -190,12 +223,18 @@ impl<'a> Sitting<'a> {
     fn presets(&self, rows: &[Row]) -> Presets {
         let about = format!(
             "the front of {} settings on {} cases, {} threads a run; chosen by pcadlang tradeoff",
-            self.settings.len(),
+            self.candidates.len(),
             self.cases.len(),
             self.threads,
         );
         let needs = if self.a.keypoints.is_some() { vec!["keypoints".to_owned()] } else { Vec::new() };
-        Presets::of(&self.settings, rows, about, self.error_name().into(), needs)
+        let mut front = Preset::front(&self.candidates, rows);
+        for preset in &mut front {
+            // What all runs were told is part of what was measured.
+            let given = self.a.given.sets.iter().cloned();
+            preset.setting.set = given.chain(std::mem::take(&mut preset.setting.set)).collect();
+        }
+        Presets { about, error: self.error_name().into(), needs, front }
     }
 
     /// Writes everything that is made of the runs.
@@ -233,9 +272,10 @@ impl<'a> Sitting<'a> {
         let rows = self.rows();
         let presets = self.presets(&rows);
         println!("the front, error: {}", self.error_name());
-        for p in &presets.front {
-            let [low, high] = p.interval;
-            println!("{:>9}  {:.4} ({low:.4} to {high:.4})  {}", seconds(p.seconds), p.error, p.setting.name());
+        let mut front: Vec<&Row> = rows.iter().filter(|r| r.front).collect();
+        front.sort_by(|a, b| a.seconds.total_cmp(&b.seconds));
+        for r in front {
+            println!("{:>9}  {:.4} ({:.4} to {:.4})  {}", seconds(r.seconds), r.error, r.low, r.high, r.setting);
         }
         for q in Quality::ALL {
             if let Some(c) = presets.of_quality(q) {
@@ -262,15 +302,18 @@ fn told(run: &RunRecord) -> String {
     format!("{} on {}: {end}", run.setting, run.case)
 }
 
-/// The file of settings: the one that is named, or the program's own, `NAME.settings.json`.
-fn settings_of(a: &Tradeoff) -> Result<(String, String), Failure> {
-    if let Some(path) = &a.settings {
+/// The files of settings with their names: those that are named, or the program's own, `NAME.settings.json`.
+fn settings_of(a: &Tradeoff) -> Result<Vec<(String, String)>, Failure> {
+    let named = a.settings.iter().map(|path| {
         let text = String::from_utf8(files::read(path)?).map_err(|_| plain(format!("{}: not text", path.display())))?;
-        return Ok((path.display().to_string(), text));
+        Ok((path.display().to_string(), text))
+    });
+    if named.len() > 0 {
+        return named.collect();
     }
     let name = Path::new(&a.given.program).with_extension("settings.json").display().to_string();
     match std::fs::read_to_string(&name).ok().or_else(|| load::embedded(&name).map(str::to_owned)) {
-        Some(text) => Ok((name, text)),
+        Some(text) => Ok(vec![(name, text)]),
         None => Err(Failure::Plain(
             format!("{name} is not there, so it is not known which settings to try"),
             Some(
@@ -279,9 +322,4 @@ fn settings_of(a: &Tradeoff) -> Result<(String, String), Failure> {
             ),
         )),
     }
-}
-
-/// A hash of the file that `NAME=FILE` or `NAME=FILE#ID` names.
-fn observed_hash(spec: &str) -> String {
-    std::fs::read(given::file_of(spec)).map(|b| bytes_hash(&b)).unwrap_or_default()
 }

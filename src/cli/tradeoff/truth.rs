@@ -30,6 +30,11 @@ impl Truth {
     }
 }
 
+/// Files that say what is to be seen of an object.
+pub const SURFACE: [&str; 4] = ["gt.npz", "depth.npy", "normals.npy", "meta.json"];
+/// The file that has the labels of all people.
+pub const LABELS: &str = "annotations.json";
+
 /// The largest array that is read.
 const MOST_BYTES: u64 = 1 << 30;
 
@@ -121,9 +126,10 @@ struct Person {
     keypoints: IndexMap<String, Vec<f64>>,
 }
 
-/// The labelled joints of the people of a dataset: `{NAME: [x, y, v], …}`, not labelled where v is 0. People without any are left out.
+/// The labelled joints of the people of a dataset: `{NAME: [x, y, v], …}`, not labelled where v is 0. People whose labels are not
+/// enough for a score are left out.
 pub fn people(dataset: &Path) -> Result<IndexMap<String, JointsTruth>, Failure> {
-    let path = dataset.join("annotations.json");
+    let path = dataset.join(LABELS);
     let all: Annotations =
         serde_json::from_slice(&files::read(&path)?).map_err(|e| plain(format!("{}: {e}", path.display())))?;
     let labelled = |k: &Vec<f64>| match k[..] {
@@ -133,7 +139,7 @@ pub fn people(dataset: &Path) -> Result<IndexMap<String, JointsTruth>, Failure> 
     };
     let joints = |p: Person| {
         let joints: IndexMap<_, _> = p.keypoints.iter().filter_map(|(n, k)| Some((n.clone(), labelled(k)?))).collect();
-        (!joints.is_empty()).then_some((p.id, JointsTruth { joints }))
+        Some((p.id, JointsTruth { joints })).filter(|(_, truth)| truth.is_enough())
     };
     Ok(all.people.into_iter().filter_map(joints).collect())
 }

@@ -7,7 +7,7 @@ use crate::cli::args::{Given, Job, QualityArg, Sampling, Tradeoff};
 use crate::cli::job::{self, Interrupt, Ready};
 use crate::cli::keypoints::Joints;
 use crate::cli::progress::Ending;
-use crate::cli::{Failure, scene};
+use crate::cli::{Failure, plain, scene};
 use indexmap::IndexMap;
 use pcadlang::infer::draws::Sink;
 use pcadlang::infer::{BestSoFar, BestState, Progress, Watch, Watches};
@@ -15,7 +15,6 @@ use pcadlang::lang::builtins::scene::ViewValue;
 use pcadlang::render::View;
 use pcadlang::report::{Memory, Moments, Tee, quantities};
 use pcadlang::score::Surface;
-use pcadlang::trace::Trace;
 use pcadlang::tradeoff::{Mark, RunRecord, Setting, marks};
 use std::sync::Arc;
 use std::time::{Duration, Instant};
@@ -140,6 +139,10 @@ fn measure(
     let chains = results?.into_iter().collect::<Result<Vec<_>, _>>().map_err(|e| ready.model.chain_error(e))?;
     record.steps = chains.iter().map(|c| c.steps + c.warmup).sum();
     if let Truth::Posterior(reference) = &task.case.truth {
+        let found = snapshots.last().map(|s| s.sums.normals()).unwrap_or_default();
+        if let Some(name) = reference.quantities.keys().find(|name| !found.is_empty() && !found.contains_key(*name)) {
+            return Err(plain(format!("the reference has `{name}`, which the program does not collect")));
+        }
         let draws: Vec<_> = memories.iter().map(Memory::draws).collect();
         let of = quantities(&draws).into_iter().filter(|q| reference.quantities.contains_key(&q.name));
         let smallest = of.map(|q| q.summary.ess_bulk).filter(|e| e.is_finite()).min_by(f64::total_cmp);
@@ -187,7 +190,6 @@ fn scores(truth: &Truth, ready: &Ready, s: &Snapshot, joints: &Joints) -> IndexM
 fn best_view(ready: &Ready, s: &Snapshot) -> Option<Arc<View>> {
     let best = s.best.as_ref()?;
     let draws = scene::predictive(1, 0);
-    let (code, limits) = (Arc::clone(ready.model.code()), ready.model.limits().clone());
-    let (mut trace, _) = Trace::generate(code, best.choices.iter().cloned(), draws, limits).ok()?;
+    let mut trace = scene::rebuilt(&ready.model, &best.choices, draws).ok()?;
     scene::view(&mut trace, draws, None)
 }
