@@ -38,7 +38,9 @@ fn tradeoff(f: &Folder, more: &[&str]) -> folder::Done {
 fn more_draws_are_nearer_to_the_reference() {
     let f = Folder::new("tradeoff_draws");
     mean_cases(&f);
-    let done = tradeoff(&f, &["--seeds", "4", "--presets", "mean.quality.json"]);
+    // One that is better still, for comparison only.
+    f.write("more.json", r#"{"compare": true, "base": {"chains": 4, "n": 60000}}"#);
+    let done = tradeoff(&f, &["--seeds", "4", "--settings", "more.json", "--presets", "mean.quality.json"]);
     assert_eq!(done.code, 0, "{}", done.err);
     let rows = table(&f);
     let of = |setting: &str| {
@@ -49,6 +51,7 @@ fn more_draws_are_nearer_to_the_reference() {
     let errors = ["chains=2 n=2", "chains=2", "chains=2 n=20000"].map(|s| of(s).0);
     assert!(errors[0] > 2.0 * errors[1] && errors[1] > 2.0 * errors[2], "{errors:?}");
     assert!(errors[2] < 0.1 && of("chains=2").1.unwrap() > 0.0);
+    assert!(of("chains=4 n=60000").0 < errors[2]);
     let csv = f.read("tradeoff/table.csv");
     assert!(csv.starts_with("setting,end,seconds,error,low,high,cases,runs,failed,ess_per_second,front"), "{csv}");
     let plot = f.read("tradeoff/plot.svg");

@@ -6,23 +6,24 @@
 mod cases;
 mod folder;
 mod running;
+mod settings;
 mod truth;
 mod work;
 
-use super::args::{Given, Tradeoff};
+use super::args::Tradeoff;
 use super::evaluate::known;
 use super::job::{self, Interrupt};
-use super::{Failure, files, given, plain};
+use super::{Failure, given, plain};
 use cases::Case;
 use folder::Folder;
-use pcadlang::lang::load;
 use pcadlang::report::{bytes_hash, seconds, text_hash};
 use pcadlang::tradeoff::{
-    Plan, Preset, Presets, Quality, Round, Row, RunRecord, Setting, plot, rounds, rows, survivors, to_csv,
+    Preset, Presets, Quality, Round, Row, RunRecord, Setting, plot, rounds, rows, survivors, to_csv,
 };
 use serde_json::{Map, Value, json};
+use settings::Settings;
 use std::collections::HashSet;
-use std::path::{Path, PathBuf};
+use std::path::PathBuf;
 use std::sync::atomic::{AtomicUsize, Ordering};
 use std::sync::{Mutex, PoisonError};
 use std::time::Instant;
@@ -92,34 +93,8 @@ impl<'a> Sitting<'a> {
     /// Everything that can be wrong is said before the first run.
     fn prepare(a: &'a Tradeoff) -> Result<Sitting<'a>, Failure> {
         let program = given::program(&a.given, a.quiet)?;
-        let (mut settings, mut candidates): (Vec<Setting>, Vec<Setting>) = Default::default();
-        for (file, text) in settings_of(a)? {
-            let read = Plan::from_json(&text).and_then(|p| Ok((p.settings()?, p.compare)));
-            let (all, compare) = read.map_err(|e| plain(format!("{file}: {e}")))?;
-            for setting in all {
-                // A run is of the program that it is told.
-                if !compare && setting.program.is_none() && !candidates.contains(&setting) {
-                    candidates.push(setting.clone());
-                }
-                if !settings.contains(&setting) {
-                    settings.push(setting);
-                }
-            }
-        }
-        if settings.is_empty() {
-            return Err(plain("there are no settings to try: a list of `cross` is empty"));
-        }
-        let mut hashes = Map::new();
-        for setting in &settings {
-            let name = setting.program.as_deref().unwrap_or(&a.given.program);
-            let given = Given { program: name.to_owned(), sets: Vec::new(), ..a.given.clone() };
-            let mut other = given::program(&given, true)?;
-            hashes.insert(name.to_owned(), json!(other.hash()));
-            for (param, value) in a.given.sets.iter().cloned().chain(setting.set.clone()) {
-                other = other.set(&param, &value);
-            }
-            other.without_data().compile()?;
-        }
+        let Settings { all: settings, candidates } = settings::read(a)?;
+        let hashes = settings::programs(a, &settings)?;
         let mut cases = cases::open(a, &program)?;
         known(&a.cases, &a.only, cases.iter().map(|c| c.name.as_str()))?;
         cases.retain(|c| a.only.is_empty() || a.only.contains(&c.name));
@@ -300,26 +275,4 @@ fn told(run: &RunRecord) -> String {
         (None, None) => "nothing to score".into(),
     };
     format!("{} on {}: {end}", run.setting, run.case)
-}
-
-/// The files of settings with their names: those that are named, or the program's own, `NAME.settings.json`.
-fn settings_of(a: &Tradeoff) -> Result<Vec<(String, String)>, Failure> {
-    let named = a.settings.iter().map(|path| {
-        let text = String::from_utf8(files::read(path)?).map_err(|_| plain(format!("{}: not text", path.display())))?;
-        Ok((path.display().to_string(), text))
-    });
-    if named.len() > 0 {
-        return named.collect();
-    }
-    let name = Path::new(&a.given.program).with_extension("settings.json").display().to_string();
-    match std::fs::read_to_string(&name).ok().or_else(|| load::embedded(&name).map(str::to_owned)) {
-        Some(text) => Ok(vec![(name, text)]),
-        None => Err(Failure::Plain(
-            format!("{name} is not there, so it is not known which settings to try"),
-            Some(
-                r#"write one and name it by --settings: {"cross": {"time": [1, 3]}, "vary": {"chains": [1, 2]}}"#
-                    .into(),
-            ),
-        )),
-    }
 }

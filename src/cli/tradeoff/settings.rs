@@ -1,0 +1,78 @@
+//! The settings that are to be tried, and the programs they are of.
+
+use crate::cli::args::{Given, Tradeoff};
+use crate::cli::{Failure, given, plain};
+use pcadlang::lang::load;
+use pcadlang::tradeoff::{Plan, Setting};
+use serde_json::{Map, Value, json};
+use std::path::Path;
+
+/// Settings of all files.
+#[derive(Default)]
+pub struct Settings {
+    /// All of them, each once.
+    pub all: Vec<Setting>,
+    /// Those that may become presets.
+    pub candidates: Vec<Setting>,
+}
+
+/// Reads them.
+pub fn read(a: &Tradeoff) -> Result<Settings, Failure> {
+    let mut settings = Settings::default();
+    for (file, text) in files(a)? {
+        let read = Plan::from_json(&text).and_then(|p| Ok((p.settings()?, p.compare)));
+        let (all, compare) = read.map_err(|e| plain(format!("{file}: {e}")))?;
+        for setting in all {
+            // A run is of the program that it is told.
+            if !compare && setting.program.is_none() && !settings.candidates.contains(&setting) {
+                settings.candidates.push(setting.clone());
+            }
+            if !settings.all.contains(&setting) {
+                settings.all.push(setting);
+            }
+        }
+    }
+    match settings.all.is_empty() {
+        true => Err(plain("there are no settings to try: a list of `cross` is empty")),
+        false => Ok(settings),
+    }
+}
+
+/// The hashes of their programs by name, each of which compiles with what it is set to.
+pub fn programs(a: &Tradeoff, settings: &[Setting]) -> Result<Map<String, Value>, Failure> {
+    let mut hashes = Map::new();
+    for setting in settings {
+        let name = setting.program.as_deref().unwrap_or(&a.given.program);
+        let given = Given { program: name.to_owned(), sets: Vec::new(), ..a.given.clone() };
+        let mut other = given::program(&given, true)?;
+        hashes.insert(name.to_owned(), json!(other.hash()));
+        for (param, value) in a.given.sets.iter().cloned().chain(setting.set.clone()) {
+            other = other.set(&param, &value);
+        }
+        other.without_data().compile()?;
+    }
+    Ok(hashes)
+}
+
+/// The files of settings with their names: those that are named, or the program's own, `NAME.settings.json`.
+fn files(a: &Tradeoff) -> Result<Vec<(String, String)>, Failure> {
+    let named = a.settings.iter().map(|path| {
+        let text = String::from_utf8(crate::cli::files::read(path)?)
+            .map_err(|_| plain(format!("{}: not text", path.display())))?;
+        Ok((path.display().to_string(), text))
+    });
+    if named.len() > 0 {
+        return named.collect();
+    }
+    let name = Path::new(&a.given.program).with_extension("settings.json").display().to_string();
+    match std::fs::read_to_string(&name).ok().or_else(|| load::embedded(&name).map(str::to_owned)) {
+        Some(text) => Ok(vec![(name, text)]),
+        None => Err(Failure::Plain(
+            format!("{name} is not there, so it is not known which settings to try"),
+            Some(
+                r#"write one and name it by --settings: {"cross": {"time": [1, 3]}, "vary": {"chains": [1, 2]}}"#
+                    .into(),
+            ),
+        )),
+    }
+}
