@@ -176,3 +176,29 @@ fn what_is_outside_or_behind_costs_no_drawing() {
     let spent = work::work() - before;
     assert_eq!((lonely.len(), spent.drawn, spent.outside), (0, 0, 1));
 }
+
+#[test]
+fn odd_placements_are_as_drawn_at_once() {
+    let mut random = Uniform(33);
+    let camera = Camera::default_for(64, 48);
+    let fixed: Vec<Solid> = (0..6).map(|_| shape(&mut random).placed(somewhere(&mut random, 1.0, 0.4))).collect();
+    let mut followed = Followed::new(&camera);
+    let odd = [
+        (DVec3::new(f64::NAN, 0.0, 0.0), 1.0),
+        (DVec3::new(0.0, f64::INFINITY, 0.0), 1.0),
+        (DVec3::splat(1e300), 1.0),
+        (DVec3::new(0.3, 0.0, 8.0), 1.0),
+        (DVec3::ZERO, 0.0),
+        (DVec3::ZERO, 1e-300),
+        (DVec3::ZERO, 1e9),
+        (DVec3::new(0.0, 0.0, -1e7), 1e6),
+    ];
+    let mut drawn = 0;
+    for (at, size) in odd.into_iter().cycle().take(24) {
+        for place in [Affine::new(at, DVec3::ZERO, DVec3::splat(size)), somewhere(&mut random, 0.6, 0.5)] {
+            let solid = Solid::group(&[&fixed[..], &[sphere(11, 7).placed(place)]].concat());
+            drawn += usize::from(followed.check(&solid, &camera)[0]);
+        }
+    }
+    assert!(drawn > 30, "{drawn}");
+}
