@@ -88,6 +88,13 @@ fn what_was_run_is_not_run_again() {
     assert_eq!(again.code, 0, "{}", again.err);
     let after = f.read("tradeoff/runs.jsonl");
     assert!(after.starts_with(&before) && after.lines().count() == 5, "one more setting: {after}");
+    // What failed is tried again.
+    let failed = after.replacen(r#""seed":1,"#, r#""seed":1,"failed":"no","#, 1);
+    assert_ne!(failed, after);
+    f.write("tradeoff/runs.jsonl", failed);
+    assert_eq!(tradeoff(&f, &["--only", "a"]).code, 0);
+    let after = f.read("tradeoff/runs.jsonl");
+    assert!(after.lines().count() == 5 && !after.contains("failed"), "{after}");
     // A program that fails does so in every run, and that is said.
     f.write("mean.pcad", MEAN.replace("d.y", "d.z"));
     let failing = tradeoff(&f, &["--only", "a", "--out", "fails"]);

@@ -29,6 +29,10 @@ for n in 1000 20000; do
     "$root/programs/lathe.pcad" > lathe_bank_$n.pcad
   [ -e lathe_$n.bank ] || "$PCADLANG" learn lathe_bank_$n.pcad -n $n -o lathe_$n.bank ${camera:+--camera "$camera"}
 done
+for variant in lathe_delayed.pcad lathe_bank_*.pcad; do
+  # A pattern that no longer fits lathe.pcad would measure lathe.pcad by another name.
+  ! cmp -s "$root/programs/lathe.pcad" $variant || { echo "$variant is lathe.pcad itself" >&2; exit 1; }
+done
 
 "$PCADLANG" tradeoff lathe.pcad --cases "$objects" --seeds 2 --budget 70m --out objects \
   --settings "$root/programs/lathe.settings.json" --settings "$here/objects.settings.json" \

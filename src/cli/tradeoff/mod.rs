@@ -22,7 +22,7 @@ use pcadlang::tradeoff::{
 };
 use serde_json::{Map, Value, json};
 use settings::Settings;
-use std::collections::HashSet;
+use std::collections::{BTreeSet, HashSet};
 use std::path::PathBuf;
 use std::sync::atomic::{AtomicUsize, Ordering};
 use std::sync::{Mutex, PoisonError};
@@ -103,8 +103,10 @@ impl<'a> Sitting<'a> {
         let machine = job::machine_threads();
         let threads = a.threads.map_or(THREADS.min(machine), |n| n as usize);
         let jobs = a.jobs.map_or((machine / threads).max(1), |n| n as usize);
-        let read = |path: &PathBuf| std::fs::read(path).map(|b| bytes_hash(&b)).unwrap_or_default();
-        let inputs: String = cases.iter().flat_map(Case::files).map(|path| read(&path)).collect();
+        // Cases of people share files: each is read once.
+        let files: BTreeSet<PathBuf> = cases.iter().flat_map(Case::files).collect();
+        let inputs: String =
+            files.iter().map(|path| std::fs::read(path).map(|b| bytes_hash(&b)).unwrap_or_default()).collect();
         let head = json!({
             "version": env!("CARGO_PKG_VERSION"),
             "program": a.given.program,
