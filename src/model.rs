@@ -31,6 +31,9 @@ use crate::syntax::parse;
 use crate::trace::{Draws, Limits, Trace};
 use std::sync::Arc;
 
+/// How many draws from the prior show what choices a default plan is for.
+const DRAWS_FOR_PLAN: u64 = 10;
+
 /// A compiled program with its data.
 #[derive(Debug)]
 pub struct Model {
@@ -154,8 +157,9 @@ impl Model {
         if let Some(p) = self.compiled.plans.first() {
             return Ok((Arc::clone(&p.body), None));
         }
-        let mut trace = self.simulate(0, 0)?;
-        let text = default_plan(&mut trace);
+        let mut draws = vec![self.simulate(0, 0)?];
+        draws.extend((1..DRAWS_FOR_PLAN).filter_map(|i| self.simulate(0, i).ok()));
+        let text = default_plan(&mut draws);
         let mut sources = self.sources.clone();
         let file = sources.add("<default plan>", &text);
         let (program, _) = parse(&text, file);

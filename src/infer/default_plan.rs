@@ -2,22 +2,29 @@
 
 use crate::trace::{ChoiceKind, Selector, Trace};
 
-/// The plan for a program whose observations ask for these choices, as program text.
+/// The plan for a program, as program text, by the choices that some draws from its prior make: another draw may ask for
+/// choices that the first does not.
 ///
 /// Where the density has a gradient, `nuts` moves all continuous choices together and a sweep of `gibbs` the finite ones; the
-/// rest is left to kernels that need no slope.
-pub fn default_plan(trace: &mut Trace) -> String {
+/// rest is left to kernels that need no slope. `nuts` and sweeps stay within one structure: where that depends on choices of theirs,
+/// kernels that take one at a time change it.
+pub fn default_plan(draws: &mut [Trace]) -> String {
     let mut count = |kind| {
-        let s = trace.select(&Selector::Kind(kind));
-        trace.targets(s).len()
+        let of = |trace: &mut Trace| {
+            let s = trace.select(&Selector::Kind(kind));
+            trace.targets(s).len()
+        };
+        draws.iter_mut().map(of).max().unwrap_or(0)
     };
     let (continuous, discrete) = (count(ChoiceKind::Continuous), count(ChoiceKind::Discrete));
     let (finite, gaussian) = (count(ChoiceKind::Finite), count(ChoiceKind::Gaussian));
     if continuous + discrete == 0 {
         return "infer {\n  repeat 1000 { }\n}\n".into();
     }
-    if continuous > 0 && has_gradient(trace) {
-        with_gradient(finite, discrete)
+    if continuous > 0 && draws.iter_mut().all(has_gradient) {
+        let depends = |kind| draws.iter().any(|t: &Trace| t.structure_depends_on(kind));
+        let (on_continuous, on_finite) = (depends(ChoiceKind::Continuous), depends(ChoiceKind::Finite));
+        with_gradient(finite, discrete, on_continuous, on_finite)
     } else {
         without_gradient(continuous, discrete, finite, gaussian)
     }
@@ -30,10 +37,18 @@ fn has_gradient(trace: &mut Trace) -> bool {
     trace.gradient(&targets, 1.0, &mut Vec::new()).is_ok()
 }
 
-fn with_gradient(finite: usize, discrete: usize) -> String {
+fn with_gradient(finite: usize, discrete: usize, on_continuous: bool, on_finite: bool) -> String {
     let mut pass = String::from(" nuts($continuous);");
+    if on_continuous {
+        pass += " mh(one($continuous));";
+    }
     if finite > 0 {
         pass += " gibbs(each($finite));";
+    }
+    match finite {
+        _ if !on_finite => {}
+        0..4 => pass += " gibbs(one($finite));",
+        _ => pass += &format!(" repeat {} {{ gibbs(one($finite)); }}", (finite / 2).min(50)),
     }
     if discrete > finite {
         let unbounded = discrete - finite;

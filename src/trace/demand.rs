@@ -161,7 +161,8 @@ impl Graph {
                 Ok(Step::Done) => {}
                 Ok(Step::Wait) => {}
                 Err(e) => {
-                    self.stack.truncate(bottom);
+                    self.failed.clear();
+                    self.failed.extend(self.stack.drain(bottom..));
                     return Err(e);
                 }
             }

@@ -36,8 +36,9 @@ pub(crate) struct Graph {
     pub version: u32,
     /// Counts the updates that were kept.
     pub revision: u64,
-    /// Nodes being evaluated.
+    /// Nodes being evaluated, and those that were when an evaluation failed.
     pub stack: Vec<NodeId>,
+    pub failed: Vec<NodeId>,
     /// Effects of new frames, to be run.
     pub effects: Vec<NodeId>,
     /// Effects and choices that became stale.
@@ -103,6 +104,7 @@ impl Graph {
             version: 0,
             revision: 0,
             stack: Vec::new(),
+            failed: Vec::new(),
             effects: Vec::new(),
             stale_effects: Vec::new(),
             stale_choices: Vec::new(),

@@ -89,11 +89,6 @@ impl Graph {
         Before { prior: self.prior.clone(), likelihood: self.likelihood.clone() }
     }
 
-    /// The nodes that the current update may have changed.
-    pub fn journaled(&self) -> impl Iterator<Item = NodeId> {
-        self.journal.iter().filter_map(|e| if let Entry::Node { id, .. } = e { Some(*id) } else { None })
-    }
-
     /// Notes a mutation. A first run is never undone.
     #[inline]
     pub fn note(&mut self, entry: Entry) {

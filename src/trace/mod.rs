@@ -49,7 +49,7 @@ use crate::lang::value::{Likelihood, Located, Value};
 pub use gradient::Recording;
 use graph::Graph;
 use journal::Before;
-pub(crate) use marginal::Sums;
+pub(crate) use marginal::{Explored, Marginal, Sums};
 use node::{NONE, State};
 pub(crate) use peek::Peek;
 use std::sync::Arc;

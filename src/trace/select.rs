@@ -90,6 +90,18 @@ impl Pattern {
         Pattern { segments: address.segments.iter().map(segment).collect() }
     }
 
+    /// Whether it can match an address that ends in segments of these names: its last names are among them, in order.
+    fn may_match(&self, last: &[&str]) -> bool {
+        let fits = |rest: &[PatternSegment]| {
+            let mut names = last.iter();
+            rest.iter().all(|s| match s {
+                PatternSegment::Deep => true,
+                PatternSegment::Segment { name, .. } => names.any(|n| name.as_ref().is_none_or(|name| &**name == *n)),
+            })
+        };
+        (0..self.segments.len()).any(|i| fits(&self.segments[i..]))
+    }
+
     /// Whether an address is selected: matched, or below something matched.
     pub fn matches(&self, address: &Address) -> bool {
         matches(&self.segments, &address.segments)
@@ -123,6 +135,18 @@ impl Selector {
             Selector::Union(a, b) => a.names(address) || b.names(address),
             Selector::Both(a, b) => a.names(address) && b.names(address),
             Selector::Minus(a, b) => a.names(address) && !b.names(address),
+            _ => false,
+        }
+    }
+
+    /// Whether it may select by address something whose address ends in segments of these names, with any keys.
+    pub(crate) fn may_name(&self, last: &[&str]) -> bool {
+        match self {
+            Selector::All => true,
+            Selector::Address(p) => p.may_match(last),
+            Selector::Union(a, b) => a.may_name(last) || b.may_name(last),
+            Selector::Both(a, b) => a.may_name(last) && b.may_name(last),
+            Selector::Minus(a, _) => a.may_name(last),
             _ => false,
         }
     }

@@ -4,22 +4,30 @@
 use super::propose::{Change, Constraint, Draws, Weight};
 use super::{Selector, Target, Trace, TraceResult};
 use crate::lang::code::Op;
+use rustc_hash::FxHashMap;
 use std::cmp::Ordering;
 use std::sync::Arc;
 
 impl Trace {
-    /// The same choices with the coarse surrogates of the selected observations in their place; `None` if none of those has
-    /// one. An operation in a loop or function changes as a whole.
+    /// The same choices with the coarse surrogates of the selected observations in their place, also of those that are not
+    /// there now; `None` if none of them has one. An operation in a loop or function changes as a whole.
     ///
     /// # Errors
     /// What goes wrong while the surrogates are evaluated.
     pub(crate) fn under_surrogates(&self, at: &Selector) -> TraceResult<Option<Trace>> {
-        let coarse = |n: &u32| matches!(self.graph.op(&self.code, *n), Op::Observe { coarse: Some(_), .. });
-        let named = |n: &u32| at.names(&self.graph.address(&self.code, *n));
-        let mut ops: Vec<u32> =
-            self.scored_nodes().filter(coarse).filter(named).map(|n| self.graph.nodes[n as usize].op).collect();
-        ops.sort_unstable();
-        ops.dedup();
+        let mut present: FxHashMap<u32, bool> = FxHashMap::default();
+        for n in self.scored_nodes() {
+            *present.entry(self.graph.nodes[n as usize].op).or_default() |=
+                at.names(&self.graph.address(&self.code, n));
+        }
+        let named = |op: &u32| match &self.code.ops[*op as usize] {
+            Op::Observe { coarse: Some(_), site, .. } => {
+                let segments = self.code.sites[*site as usize].segments.iter().map(|s| &*s.name);
+                present.get(op).copied().unwrap_or_else(|| at.may_name(&segments.collect::<Vec<_>>()))
+            }
+            _ => false,
+        };
+        let ops: Vec<u32> = (0..self.code.ops.len() as u32).filter(named).collect();
         if ops.is_empty() {
             return Ok(None);
         }
@@ -46,6 +54,22 @@ impl Trace {
             }
         });
         self.propose_constrained(&changes, &constraints, Draws::default())
+    }
+
+    /// Hashes of the addresses of the choices that another trace has not.
+    pub(crate) fn beyond(&self, other: &Trace) -> Vec<u64> {
+        let mut own = Vec::new();
+        pairs(self, other, |here, there| {
+            if let (Some(t), None) = (here, there) {
+                own.push(self.graph.choice_hash(&self.code, t.node));
+            }
+        });
+        own
+    }
+
+    /// Whether the pending proposal takes away a choice at one of these addresses, also if another one comes in its place.
+    pub(crate) fn takes_away(&self, addresses: &[u64]) -> bool {
+        self.graph.removed.iter().any(|(_, hash, _)| addresses.contains(hash))
     }
 
     /// The first choice of another trace that this one has not.

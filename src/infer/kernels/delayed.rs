@@ -82,7 +82,7 @@ impl Kernel for Delayed {
         self.follow(trace)?;
         let Some(twin) = &mut self.twin else { return Ok(Outcome::default()) };
         let before = tempered(twin, at.power);
-        let more = trace.choice_count() - twin.choice_count();
+        let beyond = trace.beyond(twin);
         let inner = self.kernel.step(twin, &At { member: at.member, ..at.within(0) })?;
         twin.rollback();
         if inner.accepted == 0 {
@@ -94,8 +94,8 @@ impl Kernel for Delayed {
             Some(w) => {
                 let fine =
                     if at.power == 1.0 { w.log_joint } else { w.log_joint - (1.0 - at.power) * w.log_likelihood };
-                // Choices that only the observation asks for stay as they are.
-                let same = trace.lacks(twin).is_none() && trace.choice_count() - twin.choice_count() == more;
+                // Choices that only the observation asks for stay as they are: nothing here would pay for others.
+                let same = trace.lacks(twin).is_none() && trace.beyond(twin) == beyond && !trace.takes_away(&beyond);
                 let decided = settle(trace, if same { fine - coarse } else { f64::NEG_INFINITY }, &mut at.stream());
                 Outcome { accepted: decided.accepted.min(inner.accepted), ..inner }
             }

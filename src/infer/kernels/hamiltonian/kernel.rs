@@ -6,7 +6,7 @@ use super::{Memory, Point, System};
 use crate::infer::kernel::{At, Kernel, Outcome, Pick, Registered, Scope};
 use crate::infer::state::{StateError, pack, unpack};
 use crate::rng::Stream;
-use crate::trace::{Selector, Target, Trace, TraceResult};
+use crate::trace::{Marginal, Selector, Trace, TraceResult};
 use std::sync::Arc;
 
 /// How a kernel goes through the space.
@@ -65,10 +65,10 @@ impl<T> Hamiltonian<T> {
 
 #[allow(private_bounds)]
 impl<T: Trajectory> Hamiltonian<T> {
-    fn go(&mut self, trace: &mut Trace, at: &At, sites: &[Target]) -> TraceResult<Outcome> {
+    fn go(&mut self, trace: &mut Trace, at: &At, marginal: Option<Marginal>) -> TraceResult<Outcome> {
         let mut rng = at.stream();
         let (targets, _) = self.scope.members(trace, at, &mut rng);
-        let Some((mut system, here)) = System::begin(trace, at, &targets, sites, &mut self.memory)? else {
+        let Some((mut system, here)) = System::begin(trace, at, &targets, marginal, &mut self.memory)? else {
             return Ok(Outcome::default());
         };
         let step = self.adaptation.step(&mut system, &here, at.adapting, &mut rng)?;
@@ -100,7 +100,7 @@ impl<T: Trajectory + Send> Kernel for Hamiltonian<T> {
     }
 
     fn step(&mut self, trace: &mut Trace, at: &At) -> TraceResult<Outcome> {
-        let sites = self.summed.members(trace, at, &mut at.stream()).0;
-        with_alternatives(sites, trace, at, |trace, sites| self.go(trace, at, sites))
+        let selections = (self.summed.selection(trace), self.scope.selection(trace));
+        with_alternatives(selections, trace, at, |trace, marginal| self.go(trace, at, marginal))
     }
 }

@@ -93,7 +93,7 @@ impl Kernel for Optimize {
     fn step(&mut self, trace: &mut Trace, at: &At) -> TraceResult<Outcome> {
         let mut rng = at.stream();
         let (targets, _) = self.scope.members(trace, at, &mut rng);
-        let Some((mut system, begun)) = System::begin(trace, at, &targets, &[], &mut self.memory)? else {
+        let Some((mut system, begun)) = System::begin(trace, at, &targets, None, &mut self.memory)? else {
             return Ok(Outcome::default());
         };
         let mut here = Arc::clone(&begun);

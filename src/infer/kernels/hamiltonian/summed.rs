@@ -1,29 +1,33 @@
 //! Densities and forces with finite choices summed out, and their draw from the conditional afterwards.
 //!
-//! A place is looked at once for each joint value of the largest group of choices (see [`Sums`]), all groups at a value of
-//! theirs at a time. The force is the mean, over the conditional of the choices, of that of the log joint. Drawing the choices
+//! A place is looked at until every group of choices was at each of its joint values ([`Sums::looks`]), all groups at a value
+//! of theirs at a time. The force is the mean, over the conditional of the choices, of that of the log joint. Drawing the choices
 //! from that conditional at the end leaves the joint density of both invariant. Choices that only other values ask for (a component
-//! of a mixture that no label points at) are drawn from their prior for the time of the move, and forgotten after it.
+//! of a mixture that no label points at) are drawn from their prior for the time of the move, and forgotten after it. A place where
+//! other choices than those would be asked for has no density, from wherever it is reached.
 
 use super::{Point, System};
 use crate::infer::kernel::{At, Outcome, recoverable};
 use crate::infer::selection::fail;
 use crate::num::log_sum_exp;
 use crate::rng::Stream;
-use crate::trace::{Sums, Target, Trace, TraceResult, Weight};
+use crate::trace::{Change, Explored, Marginal, Selection, Sums, Target, Trace, TraceResult, Weight};
 use std::sync::Arc;
 
 /// What a system sums out.
 #[derive(Debug)]
 pub(super) struct Summed {
-    sums: Arc<Sums>,
-    /// Where the system began, and the log density there.
-    start: Vec<f64>,
+    marginal: Marginal,
+    /// The changes that lead back to where the system began, what was seen and the log density there.
+    start: Vec<(Target, Change)>,
+    begun: Option<View>,
     origin: f64,
 }
 
 /// A place with all choices that are summed out at each of their values.
+#[derive(Debug)]
 struct View {
+    sums: Arc<Sums>,
     log_density: f64,
     /// By group and joint value: the log probability given the place.
     conditional: Vec<Vec<f64>>,
@@ -31,110 +35,156 @@ struct View {
 
 /// Makes a step with all choices there that the values of what is summed out ask for, and gives it what that is.
 pub(super) fn with_alternatives(
-    sites: Vec<Target>,
+    (sites, moving): (Selection, Selection),
     trace: &mut Trace,
     at: &At,
-    step: impl FnOnce(&mut Trace, &[Target]) -> TraceResult<Outcome>,
+    step: impl FnOnce(&mut Trace, Option<Marginal>) -> TraceResult<Outcome>,
 ) -> TraceResult<Outcome> {
-    if sites.is_empty() {
-        return step(trace, &sites);
+    if trace.targets(sites).is_empty() {
+        return step(trace, None);
     }
-    let held = trace.hold_alternatives(&sites, at.within(1).draws(0))?;
-    let outcome = step(trace, &sites);
+    let (marginal, held) = trace.marginalise(sites, moving, at.within(1).draws(0))?;
+    let outcome = step(trace, Some(marginal));
     trace.let_go(held)?;
     outcome
 }
 
 impl System<'_> {
     /// Sums choices out from now on, and fills in the force at the present place; false if the density has no slope there then.
-    pub(super) fn sum_out(&mut self, sites: &[Target], point: &mut Point) -> TraceResult<bool> {
-        let sums = Arc::new(self.trace.sums(sites)?);
-        self.summed = Some(Summed { sums, start: point.y.clone(), origin: 0.0 });
-        let there = self.evaluate_summed(point)?;
+    pub(super) fn sum_out(&mut self, marginal: Marginal, point: &mut Point) -> TraceResult<bool> {
+        let here = |t: &Target| Some((*t, Change::Set(self.trace.stored(*t)?)));
+        let start = self.layout.targets.iter().filter_map(here).collect();
+        self.summed = Some(Summed { marginal, start, begun: None, origin: 0.0 });
+        let begun = self.evaluate_summed(point)?;
         self.trace.rollback();
+        let there = begun.is_some();
         if let Some(summed) = &mut self.summed {
             summed.origin = point.log_density;
+            summed.begun = begun;
         }
         point.log_density = 0.0;
         Ok(there)
     }
 
-    /// Goes to a place, with the choices at joint values given by group.
-    fn put(&mut self, sums: &Sums, y: &[f64], value: impl Fn(usize) -> usize) -> TraceResult<Option<Weight>> {
-        let mut changes = self.memory.changes(y, false, &self.layout).to_vec();
-        changes.extend(sums.changes(value));
+    /// Goes to a place, with the groups at joint values.
+    fn put(&mut self, sums: &Sums, at: &[(Target, Change)], values: &[usize]) -> TraceResult<Option<Weight>> {
+        let mut changes = at.to_vec();
+        if let Some(summed) = &self.summed {
+            summed.marginal.changes(sums, values, &mut changes);
+        }
         let w = recoverable(self.trace.propose(&changes, self.at.draws(0)))?;
         Ok(w.filter(|w| w.appeared + w.vanished == 0))
     }
 
-    fn view(&mut self, sums: &Sums, y: &[f64]) -> TraceResult<Option<View>> {
-        let counts: Vec<usize> = sums.counts().collect();
-        let mut conditional: Vec<Vec<f64>> = counts.iter().map(|n| Vec::with_capacity(*n)).collect();
-        let (mut log_density, mut jacobian, mut terms) = (0.0, 0.0, Vec::new());
-        for k in 0..sums.passes() {
-            let Some(w) = self.put(sums, y, |i| if k < counts[i] { k } else { 0 })? else { return Ok(None) };
-            let base = self.trace.parts(sums, self.at.power, &mut terms);
+    /// Looks at a place. `None` where there is no density.
+    fn view(&mut self, at: &[(Target, Change)]) -> TraceResult<Option<View>> {
+        let Some(summed) = &mut self.summed else { return Ok(None) };
+        let known = Arc::clone(&summed.marginal.sums);
+        if !known.structure_moves
+            && let Some(view) = self.look(known, at)?
+        {
+            return Ok(Some(view));
+        }
+        // What is read there may be something else.
+        let Some(summed) = &mut self.summed else { return Ok(None) };
+        match self.trace.explore(at, true, &mut summed.marginal, self.at.draws(0))? {
+            Explored::Sums(sums) => self.look(sums.into(), at),
+            Explored::Structure(_) | Explored::Nowhere => Ok(None),
+        }
+    }
+
+    /// Looks at a place by sums that hold there. `None` if they do not, or if there is no density.
+    fn look(&mut self, sums: Arc<Sums>, at: &[(Target, Change)]) -> TraceResult<Option<View>> {
+        let mut conditional: Vec<Vec<f64>> = sums.seen().map(|s| vec![f64::NEG_INFINITY; s.len()]).collect();
+        let (mut base, mut jacobian, mut terms) = (0.0, 0.0, Vec::new());
+        for (k, values) in sums.looks.iter().enumerate() {
+            let Some(w) = self.put(&sums, at, values)? else { return Ok(None) };
+            if self.summed.as_ref().is_some_and(|s| !self.trace.has_same_values(&s.marginal)) {
+                return Ok(None);
+            }
+            let rest = self.trace.parts(&sums, self.at.power, &mut terms);
             if k == 0 {
-                (log_density, jacobian) = (base + w.log_jacobian, w.log_jacobian);
+                (base, jacobian) = (rest, w.log_jacobian);
             } else if w.log_jacobian.to_bits() != jacobian.to_bits() {
                 let message = "the bounds of a choice depend on one that is summed out";
                 return Err(fail(Default::default(), message.into()));
+            } else if rest.to_bits() != base.to_bits() {
+                let message =
+                    "a score depends on choices that are summed out, and was not found to: please report this";
+                return Err(fail(Default::default(), message.into()));
             }
-            let open = conditional.iter_mut().zip(&terms).zip(&counts).filter(|(_, n)| k < **n);
-            open.for_each(|((c, t), _)| c.push(*t));
+            for (((c, t), seen), v) in conditional.iter_mut().zip(&terms).zip(sums.seen()).zip(values) {
+                if seen[*v] == Some(k) {
+                    c[*v] = *t;
+                }
+            }
         }
+        let mut log_density = base + jacobian;
         for c in &mut conditional {
             let total = log_sum_exp(c);
             log_density += total;
             c.iter_mut().for_each(|t| *t -= total);
         }
-        Ok(log_density.is_finite().then_some(View { log_density, conditional }))
+        Ok(log_density.is_finite().then_some(View { sums, log_density, conditional }))
     }
 
     /// The log density and force at a place, with the choices summed out; which of their values is pending is of no account.
-    /// False where there is none.
-    pub(super) fn evaluate_summed(&mut self, point: &mut Point) -> TraceResult<bool> {
-        let Some(summed) = &self.summed else { return Ok(false) };
-        let (sums, origin) = (Arc::clone(&summed.sums), summed.origin);
-        let Some(view) = self.view(&sums, &point.y)? else { return Ok(false) };
+    /// What was seen there; `None` where there is no density or no slope.
+    fn evaluate_summed(&mut self, point: &mut Point) -> TraceResult<Option<View>> {
+        let at = self.memory.changes(&point.y, false, &self.layout).to_vec();
+        let Some(view) = self.view(&at)? else { return Ok(None) };
+        let origin = self.summed.as_ref().map_or(0.0, |s| s.origin);
         point.log_density = view.log_density - origin;
         point.gradient.clear();
         point.gradient.resize(point.y.len(), 0.0);
-        let layout = Arc::clone(&self.layout);
+        let (sums, layout) = (Arc::clone(&view.sums), Arc::clone(&self.layout));
         let mut part = Vec::with_capacity(point.y.len());
-        for k in (0..sums.passes()).rev() {
-            if k + 1 < sums.passes() {
-                let value = |i: usize| if k < view.conditional[i].len() { k } else { 0 };
-                if self.put(&sums, &point.y, value)?.is_none() {
-                    return Ok(false);
-                }
+        for (k, values) in sums.looks.iter().enumerate().rev() {
+            // The last look is pending.
+            if k + 1 < sums.looks.len() && self.put(&sums, &at, values)?.is_none() {
+                return Ok(None);
             }
-            let weight = |n: u32| match sums.group_of(n) {
-                Some(i) => view.conditional[i].get(k).map_or(0.0, |l| libm::exp(*l)),
-                None => f64::from(u8::from(k == 0)),
-            };
+            let first = sums.seen().zip(values).map(|(seen, v)| seen[*v] == Some(k));
+            let weights = first.zip(&view.conditional).zip(values);
+            let weights: Vec<f64> = weights.map(|((first, c), v)| if first { libm::exp(c[*v]) } else { 0.0 }).collect();
+            let base = f64::from(u8::from(k == 0));
+            let weight = |n: u32| self.trace.group_of(&sums, n).map_or(base, |i| weights[i]);
             part.clear();
             self.trace.weighted_gradient(&layout.targets, self.at.power, &weight, &mut part)?;
             point.gradient.iter_mut().zip(&part).for_each(|(g, p)| *g += p);
         }
-        // Each pass has the Jacobians in it, and one is enough.
+        // Each look has the Jacobians in it, and one is enough.
         part.clear();
         self.trace.weighted_gradient(&layout.targets, self.at.power, &|_| 0.0, &mut part)?;
-        let more = sums.passes() as f64 - 1.0;
+        let more = sums.looks.len() as f64 - 1.0;
         point.gradient.iter_mut().zip(&part).for_each(|(g, p)| *g -= more * p);
-        Ok(point.gradient.iter().all(|g| g.is_finite()))
+        Ok(point.gradient.iter().all(|g| g.is_finite()).then_some(view))
+    }
+
+    /// Whether there is a density and a slope at a place, which are filled in.
+    pub(super) fn goes_summed(&mut self, point: &mut Point) -> TraceResult<bool> {
+        Ok(self.evaluate_summed(point)?.is_some())
     }
 
     /// Makes a place, or the one it began in, the state of the trace, with the choices drawn from their conditional there.
-    pub(super) fn settle_summed(mut self, summed: Summed, to: Option<&Point>) -> TraceResult<bool> {
-        let y = to.map_or(&summed.start, |p| &p.y);
+    pub(super) fn settle_summed(mut self, to: Option<&Point>) -> TraceResult<bool> {
         let mut rng = self.at.within(0).stream();
-        let Some(view) = self.view(&summed.sums, y)? else {
+        let at = match (to, &mut self.summed) {
+            (Some(p), _) => self.memory.changes(&p.y, false, &self.layout).to_vec(),
+            (None, Some(summed)) => std::mem::take(&mut summed.start),
+            (None, None) => return Ok(false),
+        };
+        let begun = self.summed.as_mut().and_then(|s| s.begun.take());
+        let view = match to {
+            Some(_) => self.view(&at)?,
+            None => begun,
+        };
+        let Some(view) = view else {
             self.trace.rollback();
             return Ok(false);
         };
         let drawn: Vec<usize> = view.conditional.iter().map(|c| draw(c, &mut rng)).collect();
-        let there = self.put(&summed.sums, y, |i| drawn[i])?.is_some();
+        let there = self.put(&view.sums, &at, &drawn)?.is_some();
         if there {
             self.trace.commit()
         } else {

@@ -8,7 +8,7 @@ use super::summed::Summed;
 use crate::infer::kernel::{At, recoverable};
 use crate::num::ExactSum;
 use crate::rng::Stream;
-use crate::trace::{Target, Trace, TraceResult};
+use crate::trace::{Marginal, Target, Trace, TraceResult};
 use std::sync::Arc;
 
 /// A place with its log density and force, and how it is passed through.
@@ -36,7 +36,7 @@ pub(super) struct System<'a> {
 }
 
 impl<'a> System<'a> {
-    /// The continuous ones of some choices, and where they are; `sites` are summed out. `None` if there are no continuous ones,
+    /// The continuous ones of some choices, and where they are, with others summed out. `None` if there are no continuous ones,
     /// or the density there has no slope.
     ///
     /// # Errors
@@ -45,14 +45,14 @@ impl<'a> System<'a> {
         trace: &'a mut Trace,
         at: &'a At,
         all: &[Target],
-        sites: &[Target],
+        marginal: Option<Marginal>,
         memory: &'a mut Memory,
     ) -> TraceResult<Option<(Self, Arc<Point>)>> {
         trace.rollback();
         let mut here = memory.point();
         let Some(point) = Arc::get_mut(&mut here) else { return Ok(None) };
         point.log_density = 0.0;
-        if sites.is_empty()
+        if marginal.is_none()
             && let Some(layout) = memory.stand(trace, all, &mut point.y)
             && memory.gradient(&point.y, at.power, &mut point.gradient)
         {
@@ -73,12 +73,12 @@ impl<'a> System<'a> {
             return Ok(None);
         }
         let layout = Arc::new(layout);
-        let taped = sites.is_empty()
+        let taped = marginal.is_none()
             && memory.record(trace, &layout, &mut point.y)
             && memory.gradient(&point.y, at.power, &mut point.gradient);
         let mut system = System { trace, at, memory, layout, taped, jacobian: jacobian.value(), summed: None };
-        if !sites.is_empty() {
-            let there = system.sum_out(sites, point)?;
+        if let Some(marginal) = marginal {
+            let there = system.sum_out(marginal, point)?;
             return Ok(if there { system.usable(here) } else { None });
         }
         if !taped {
@@ -114,7 +114,7 @@ impl<'a> System<'a> {
             return Ok(false);
         }
         if self.summed.is_some() {
-            return self.evaluate_summed(point);
+            return self.goes_summed(point);
         }
         if self.taped
             && let Some(w) = self.memory.weigh(&point.y)
@@ -191,8 +191,8 @@ impl<'a> System<'a> {
 
     /// Makes a place the state of the trace, or leaves it where it was; draws what was summed out.
     pub fn settle(mut self, to: Option<&Point>) -> TraceResult<bool> {
-        if let Some(summed) = self.summed.take() {
-            return self.settle_summed(summed, to);
+        if self.summed.is_some() {
+            return self.settle_summed(to);
         }
         let Some(point) = to else {
             self.trace.rollback();

@@ -1,0 +1,201 @@
+//! Choices that stay although nothing may ask for them: the components of a mixture that no label points at now.
+
+use super::Marginal;
+use super::explore::Explored;
+use crate::dist::{Datum, Support};
+use crate::lang::key::Key;
+use crate::trace::journal::Entry;
+use crate::trace::node::*;
+use crate::trace::{Change, Draws, Selection, Target, Trace, TraceResult};
+use rustc_hash::FxHashSet;
+
+/// Why a step cannot be made where what was drawn for it changes what it needs.
+const BY_CHANCE: &str = "what it asks for depends on choices that are drawn for the step";
+
+/// What stays until [`Trace::let_go`].
+#[derive(Debug, Default)]
+pub(crate) struct Held {
+    nodes: Vec<NodeId>,
+    /// Entries of functions with `mem`, by frame: those that choices are in.
+    frames: Vec<FrameId>,
+    entries: Vec<(NodeId, Key)>,
+}
+
+impl Trace {
+    /// Finds what the choices of a selection reach, for a kernel that moves those of another. Choices that only other values
+    /// of the first ones ask for are drawn from their prior given the rest and stay, as do those that there are, until
+    /// [`Trace::let_go`]; they may be in the selections too.
+    ///
+    /// # Errors
+    /// As [`Trace::explore`]; the trace is then as it was.
+    pub(crate) fn marginalise(
+        &mut self,
+        sites: Selection,
+        moving: Selection,
+        draws: Draws,
+    ) -> TraceResult<(Marginal, Held)> {
+        self.rollback();
+        let mut held = Held::default();
+        let before = self.constraints();
+        match self.explore_and_hold(sites, moving, draws, &mut held) {
+            Ok(marginal) => Ok((marginal, held)),
+            Err(e) => {
+                self.rollback();
+                self.let_go(held)?;
+                self.restore(&before, draws)?;
+                Err(e)
+            }
+        }
+    }
+
+    fn explore_and_hold(
+        &mut self,
+        sites: Selection,
+        moving: Selection,
+        draws: Draws,
+        held: &mut Held,
+    ) -> TraceResult<Marginal> {
+        let mut m = Marginal::default();
+        let here = |t: &Target| Some((*t, Change::Set(self.stored(*t)?)));
+        let original: Vec<_> = self.targets(sites).iter().filter_map(here).collect();
+        let there: FxHashSet<NodeId> = self.all_targets().iter().map(|t| t.node).collect();
+        let mut drawn = false;
+        loop {
+            self.take_up(&mut m, sites, moving)?;
+            match self.explore(&[], drawn, &mut m, draws)? {
+                Explored::Sums(sums) => {
+                    self.rollback();
+                    // Elsewhere others may be asked for.
+                    if sums.structure_moves && held.nodes.is_empty() {
+                        self.hold_all(held)?;
+                    }
+                    if drawn || held.nodes.iter().all(|n| there.contains(n)) {
+                        m.sums = sums.into();
+                        break;
+                    }
+                    self.draw_others(m.sites[0], &original, &there, draws)?;
+                    drawn = true;
+                }
+                Explored::Structure(_) if held.nodes.is_empty() => {
+                    self.rollback();
+                    self.hold_all(held)?;
+                }
+                Explored::Structure(changes) => {
+                    if drawn || self.propose(&changes, draws)?.appeared == 0 {
+                        return Err(self.cannot_sum(m.sites[0], "other choices appear or vanish with it"));
+                    }
+                    self.commit();
+                    self.hold_all(held)?;
+                }
+                Explored::Nowhere => return Err(self.cannot_sum(m.sites[0], BY_CHANCE)),
+            }
+        }
+        Ok(m)
+    }
+
+    /// Goes back to the choices as they were, and draws from their prior there those that came up elsewhere.
+    fn draw_others(
+        &mut self,
+        site: Target,
+        original: &[(Target, Change)],
+        there: &FxHashSet<NodeId>,
+        draws: Draws,
+    ) -> TraceResult<()> {
+        let others = self.all_targets().iter().filter(|t| !there.contains(&t.node));
+        let mut changes = original.to_vec();
+        changes.extend(others.map(|t| (*t, Change::Resample)));
+        // The same stream: where the priors are the same, so is what is drawn, and what is asked for because of it.
+        let w = self.propose(&changes, draws)?;
+        if w.appeared + w.vanished > 0 {
+            return Err(self.cannot_sum(site, BY_CHANCE));
+        }
+        self.commit();
+        Ok(())
+    }
+
+    /// Enters the choices that there are now.
+    fn take_up(&self, m: &mut Marginal, sites: Selection, moving: Selection) -> TraceResult<()> {
+        let not = |t: &Target| self.cannot_sum(*t, "it is not a discrete choice of finitely many values");
+        let known: FxHashSet<Target> = m.sites.iter().copied().collect();
+        for t in self.targets(sites).iter().filter(|t| !known.contains(t)) {
+            let support = self.dist(*t).map(|d| d.stored_support()).filter(Support::is_finite).ok_or_else(|| not(t))?;
+            let values: Vec<Datum> = support.finite_values().filter(|v| !v.is_empty()).ok_or_else(|| not(t))?;
+            m.sites.push(*t);
+            m.values.push(values);
+            m.supports.push(support);
+        }
+        m.partition.grow(m.sites.len());
+        m.moving.clear();
+        for t in self.targets(moving) {
+            let moves = self.dist(*t).is_some_and(|d| !d.stored_support().is_discrete());
+            if moves && m.moving.last() != Some(&t.node) {
+                m.moving.push(t.node);
+            }
+        }
+        Ok(())
+    }
+
+    fn hold_all(&mut self, held: &mut Held) -> TraceResult<()> {
+        let mut new: Vec<NodeId> = self.all_targets().iter().map(|t| t.node).collect();
+        new.sort_unstable();
+        new.dedup();
+        new.retain(|n| held.nodes.binary_search(n).is_err());
+        self.graph.begin();
+        for n in &new {
+            self.graph.acquire(*n, *n, false);
+            self.hold_entries(*n, held);
+        }
+        self.graph.commit(&self.code);
+        held.nodes.extend(new);
+        held.nodes.sort_unstable();
+        let makes_observations = |f: &&FrameId| {
+            let block = self.graph.frames[**f as usize].block;
+            !self.code.blocks[block as usize].effects.is_empty()
+        };
+        match held.frames.iter().find(makes_observations) {
+            Some(_) => {
+                let t = Target { node: held.nodes[0], element: NONE };
+                Err(self.cannot_sum(t, "it is in a function with `mem` that makes observations"))
+            }
+            None => Ok(()),
+        }
+    }
+
+    /// Holds the entries of functions with `mem` that a choice is in, as a call does.
+    fn hold_entries(&mut self, n: NodeId, held: &mut Held) {
+        let mut f = self.graph.nodes[n as usize].frame;
+        while self.graph.frames[f as usize].owner != NONE {
+            let (owner, key) = (self.graph.frames[f as usize].owner, self.graph.frames[f as usize].key.clone());
+            if let Some(Side::Memo(m)) = self.graph.nodes[owner as usize].side.as_deref_mut()
+                && let Some(key) = key
+                && let Some(entry) = m.entries.get_mut(&key)
+                && !held.frames.contains(&f)
+            {
+                let old = *entry;
+                entry.1 += 1;
+                self.graph.note(Entry::Memo(owner, key.clone(), Some(old)));
+                held.frames.push(f);
+                held.entries.push((owner, key));
+            }
+            f = self.graph.nodes[owner as usize].frame;
+        }
+    }
+
+    /// Lets choices go that were held: those nothing asks for vanish.
+    ///
+    /// # Errors
+    /// Those of the program.
+    pub(crate) fn let_go(&mut self, held: Held) -> TraceResult<()> {
+        self.rollback();
+        if held.nodes.is_empty() {
+            return Ok(());
+        }
+        let before = self.graph.begin();
+        held.nodes.iter().for_each(|n| self.graph.release(*n, false));
+        held.entries.iter().for_each(|(memo, key)| self.graph.leave_memo(*memo, key));
+        let settled = self.graph.settle(&self.code);
+        self.pend(before, settled)?;
+        self.commit();
+        Ok(())
+    }
+}

@@ -1,0 +1,279 @@
+//! What scores read of some choices, in one state, also in that of a pending proposal.
+//!
+//! An evaluation takes its course by what it reads: where that stays, so do its course and its value, whatever the rest of
+//! the trace is. So two choices are independent given the rest if no score reads both of them, in any state that they may
+//! be in. What a score reads is found by following operands from it, never by looking for changes: a value that comes out
+//! the same for two values of a choice says nothing about a third one.
+
+use super::partition::Partition;
+use crate::lang::code::{Callee, Code, Op, Operand};
+use crate::trace::graph::Graph;
+use crate::trace::node::*;
+use rustc_hash::{FxHashMap, FxHashSet};
+use smallvec::SmallVec;
+
+type Inputs = SmallVec<[NodeId; 8]>;
+
+/// What a value depends on.
+#[derive(Clone, Copy, Debug)]
+pub(super) struct Label {
+    /// One of the choices that are summed out, which stands for its group; [`NONE`] if there is none.
+    pub site: u32,
+    /// Whether it depends on a choice that the kernel moves.
+    pub moves: bool,
+}
+
+const NOTHING: Label = Label { site: NONE, moves: false };
+
+/// How far a node has been followed.
+#[derive(Clone, Copy, PartialEq, Eq)]
+enum Seen {
+    Not,
+    Open,
+    Done,
+}
+
+/// What was found in one state.
+#[derive(Debug, Default)]
+pub(super) struct Found {
+    /// Scores that depend on a choice: the node, and one choice of the group.
+    pub scores: Vec<(NodeId, u32)>,
+    /// Nodes whose observations and factors come and go with a choice, and one choice of the group.
+    pub owners: Vec<(NodeId, u32)>,
+    /// The choices that observations and factors ask for.
+    pub asked: Vec<NodeId>,
+    /// Whether what is read depends on choices that the kernel moves.
+    pub structure_moves: bool,
+    /// Whether the distributions of choices that are summed out depend on choices that the kernel moves.
+    pub values_move: bool,
+    /// Whether observations are made in a function with `mem`: any choice may decide about those.
+    pub anywhere: bool,
+    /// Whether observations come and go in a way that is not followed.
+    pub unclear: bool,
+}
+
+pub(super) struct Reader<'a> {
+    graph: &'a Graph,
+    code: &'a Code,
+    /// Choices that are summed out, and those that move.
+    own: &'a FxHashMap<NodeId, Label>,
+    partition: &'a mut Partition,
+    seen: Vec<Seen>,
+    labels: Vec<Label>,
+    pub found: Found,
+}
+
+impl<'a> Reader<'a> {
+    pub fn new(
+        graph: &'a Graph,
+        code: &'a Code,
+        own: &'a FxHashMap<NodeId, Label>,
+        partition: &'a mut Partition,
+    ) -> Self {
+        let n = graph.nodes.len();
+        let (seen, labels) = (vec![Seen::Not; n], vec![NOTHING; n]);
+        Reader { graph, code, own, partition, seen, labels, found: Found::default() }
+    }
+
+    /// Follows every score; choices that are read by one of them are in one group from then on. `choices` are those of the trace.
+    pub fn read_all(&mut self, choices: impl Iterator<Item = NodeId>) {
+        for n in 0..self.graph.nodes.len() as NodeId {
+            if self.graph.nodes[n as usize].state == State::Clean && self.graph.slot_facts(self.code, n).is_effect {
+                self.read_effect(n);
+            }
+        }
+        let asked = self.found.asked.len();
+        // Choices that stay although nothing asks for them have scores as well.
+        for n in choices {
+            self.visit(n);
+        }
+        self.found.asked.truncate(asked);
+    }
+
+    /// The choices that the distribution of a choice is made from.
+    pub fn origins(&self, n: NodeId) -> Vec<NodeId> {
+        let (mut open, mut seen, mut found) = (self.inputs(n), FxHashSet::default(), Vec::new());
+        while let Some(d) = open.pop() {
+            if seen.insert(d) {
+                match self.graph.op(self.code, d) {
+                    Op::Draw { .. } => found.push(d),
+                    _ => open.extend(self.inputs(d)),
+                }
+            }
+        }
+        found
+    }
+
+    /// What the nodes depend on that were being evaluated when an evaluation failed.
+    pub fn read_failed(&mut self, stack: &[NodeId]) -> Label {
+        let mut label = NOTHING;
+        for n in stack {
+            let (placed, _) = self.placed(*n);
+            label = self.join(label, placed);
+            for d in self.inputs(*n) {
+                if self.graph.nodes[d as usize].state == State::Clean {
+                    let read = self.visit(d);
+                    label = self.join(label, read);
+                }
+            }
+        }
+        label
+    }
+
+    /// Follows what runs although nothing asks for it: an observation, a factor, or what they are in.
+    fn read_effect(&mut self, n: NodeId) {
+        let read = self.visit(n);
+        let (placed, owner) = self.placed(n);
+        let is_score = matches!(self.graph.op(self.code, n), Op::Observe { .. } | Op::Factor { .. });
+        let own = if is_score { read } else { self.decided(n) };
+        let label = self.join(own, placed);
+        match owner {
+            Some(owner) => self.found.owners.push((owner, label.site)),
+            None if label.site == NONE => {}
+            None if is_score => self.found.scores.push((n, label.site)),
+            None => self.found.owners.push((n, label.site)),
+        }
+    }
+
+    fn join(&mut self, a: Label, b: Label) -> Label {
+        if a.site != NONE && b.site != NONE {
+            self.partition.join(a.site, b.site);
+        }
+        Label { site: a.site.min(b.site), moves: a.moves || b.moves }
+    }
+
+    /// What a node's value depends on.
+    fn visit(&mut self, root: NodeId) -> Label {
+        if self.seen[root as usize] != Seen::Not {
+            return self.labels[root as usize];
+        }
+        let mut stack: Vec<(NodeId, Inputs, usize, Label)> = vec![(root, self.inputs(root), 0, NOTHING)];
+        self.seen[root as usize] = Seen::Open;
+        while let Some((n, inputs, next, label)) = stack.last_mut() {
+            if let Some(input) = inputs.get(*next).copied() {
+                if self.seen[input as usize] == Seen::Not {
+                    self.seen[input as usize] = Seen::Open;
+                    let inner = self.inputs(input);
+                    stack.push((input, inner, 0, NOTHING));
+                } else {
+                    *next += 1;
+                    let (own, read) = (*label, self.labels[input as usize]);
+                    let joined = self.join(own, read);
+                    if let Some((_, _, _, label)) = stack.last_mut() {
+                        *label = joined;
+                    }
+                }
+                continue;
+            }
+            let (n, read) = (*n, *label);
+            stack.pop();
+            self.labels[n as usize] = self.ended(n, read);
+            self.seen[n as usize] = Seen::Done;
+        }
+        self.labels[root as usize]
+    }
+
+    /// What the value of a node depends on whose inputs depend on this.
+    fn ended(&mut self, n: NodeId, read: Label) -> Label {
+        if !matches!(self.graph.op(self.code, n), Op::Draw { .. }) {
+            if read.moves && !self.found.structure_moves {
+                self.found.structure_moves = self.decided(n).moves;
+            }
+            return read;
+        }
+        let own = self.own.get(&n).copied().unwrap_or(NOTHING);
+        self.found.asked.push(n);
+        self.found.values_move |= own.site != NONE && read.moves;
+        self.found.structure_moves |= self.decided(n).moves;
+        let score = self.join(own, read);
+        if score.site != NONE {
+            self.found.scores.push((n, score.site));
+        }
+        // A choice keeps its value whatever its distribution becomes, but for white noise, which is seen through it.
+        if self.graph.is_whitened(n) { score } else { own }
+    }
+
+    /// What a node's value is computed from, in all ways, and its structure.
+    fn inputs(&self, n: NodeId) -> Inputs {
+        let (g, mut all) = (self.graph, Inputs::new());
+        g.each_dep(self.code, n, |d, _| all.push(d));
+        let frame = &g.frames[g.nodes[n as usize].frame as usize];
+        let of_a_pass = match g.op(self.code, n) {
+            Op::Item => true,
+            Op::Param { .. } => matches!(frame.args, Arguments::Item | Arguments::Fold),
+            _ => false,
+        };
+        if of_a_pass && frame.owner != NONE {
+            let home = g.nodes[frame.owner as usize].frame;
+            g.op(self.code, frame.owner).operands(|o| all.extend(g.resolve(home, o)));
+            if let Some(Side::Loop(l)) = g.nodes[frame.owner as usize].side.as_deref() {
+                all.extend(l.deps.iter().copied());
+            }
+        }
+        all
+    }
+
+    /// What decides which nodes a node reads, and what is there because of it.
+    fn decided(&mut self, n: NodeId) -> Label {
+        let mut all = Inputs::new();
+        self.graph.deciders(self.code, n, |d| all.push(d));
+        let mut label = NOTHING;
+        for d in all {
+            let read = self.visit(d);
+            label = self.join(label, read);
+        }
+        label
+    }
+
+    /// What decides that a node is there, and the outermost node around it that a choice decides about.
+    fn placed(&mut self, n: NodeId) -> (Label, Option<NodeId>) {
+        let (mut label, mut outermost, mut in_memo) = (NOTHING, None, false);
+        let mut owner = self.graph.frames[self.graph.nodes[n as usize].frame as usize].owner;
+        while owner != NONE {
+            let mut decided = self.decided(owner);
+            if matches!(self.graph.op(self.code, owner), Op::Mem { .. }) {
+                // Its entries are there for calls that may be anywhere: every choice may decide.
+                self.found.anywhere = true;
+                decided.site = 0;
+            }
+            if decided.site != NONE {
+                self.found.unclear |= in_memo;
+                outermost = Some(owner);
+            }
+            in_memo |= matches!(self.graph.op(self.code, owner), Op::Mem { .. });
+            label = self.join(label, decided);
+            owner = self.graph.frames[self.graph.nodes[owner as usize].frame as usize].owner;
+        }
+        self.found.structure_moves |= label.moves;
+        (label, outermost)
+    }
+}
+
+impl Graph {
+    /// The nodes whose values decide which other nodes a node reads, and which frames it has.
+    pub(in crate::trace) fn deciders(&self, code: &Code, n: NodeId, mut f: impl FnMut(NodeId)) {
+        let node = &self.nodes[n as usize];
+        let mut operand = |o: &Operand| {
+            if let Some(d) = self.resolve(node.frame, *o) {
+                f(d);
+            }
+        };
+        match self.op(code, n) {
+            Op::If { cond, .. } | Op::Select { cond, .. } => operand(cond),
+            Op::For { iter, .. } => operand(iter),
+            Op::Map { f, over, .. } | Op::Fold { f, over, .. } => [f, over].into_iter().for_each(operand),
+            Op::Mem { f, .. } => operand(f),
+            Op::Draw { keys, .. } => keys.iter().for_each(operand),
+            // The elements of arrays are not nodes, those of containers are.
+            Op::Index { keys, .. } if node.side.is_some() => keys.iter().for_each(operand),
+            Op::Call { callee: Callee::Value(v), .. } => operand(v),
+            _ => {}
+        }
+        match node.side.as_deref() {
+            Some(Side::MemoCall(c)) => c.deps.iter().for_each(|d| f(*d)),
+            Some(Side::Table(t)) => t.deps.iter().for_each(|d| f(*d)),
+            Some(Side::Loop(l)) => l.deps.iter().for_each(|d| f(*d)),
+            _ => {}
+        }
+    }
+}

@@ -1,0 +1,214 @@
+//! One program and one plan: each pass of the plan begins in an independent exact draw from the posterior, so what it ends in is an
+//! exact draw as well if the plan leaves the posterior invariant. The draws are independent, so exact tests apply.
+
+use super::plans::Plan;
+use super::posterior::Posterior;
+use super::verdict::{Counts, Pooled};
+use pcadlang::Program;
+use pcadlang::infer::draws::Discard;
+use pcadlang::infer::{ChainError, Latent, Neighbours, Progress, RunOptions, Watch, run_from};
+use pcadlang::rng::{Purpose, StreamKey};
+use pcadlang::trace::{Draws, Limits, Trace};
+use std::sync::{Arc, Mutex};
+
+/// Intervals that places of continuous choices are counted in.
+const BINS: usize = 8;
+
+/// What came of it.
+pub enum Said {
+    /// How the draws fell, how they pool, and the share of passes that ended in another state than they began in.
+    Counted(Counts, Pooled, f64),
+    /// The plan says that it cannot do this.
+    Refused(String),
+    /// It failed, or went where the posterior has nothing.
+    Failed(String),
+}
+
+/// Puts the chain in an exact draw whenever it records one, and counts what it had made of the last.
+struct Restart {
+    posterior: Arc<Posterior>,
+    seed: u64,
+    seen: Mutex<Seen>,
+}
+
+impl std::fmt::Debug for Restart {
+    fn fmt(&self, f: &mut std::fmt::Formatter<'_>) -> std::fmt::Result {
+        f.write_str("restart")
+    }
+}
+
+#[derive(Default)]
+struct Seen {
+    begun: u64,
+    ended: Vec<(usize, Vec<f64>)>,
+    moved: u64,
+    /// The state that the present pass began in.
+    from: Option<(usize, Vec<f64>)>,
+    failed: Option<String>,
+}
+
+impl Watch for Restart {
+    fn draw(&self, _chain: u32, trace: &mut Trace, draws: Draws) {
+        let Ok(mut seen) = self.seen.lock() else { return };
+        let place = |t: &Trace| self.posterior.place(t);
+        if let Some(from) = seen.from.take() {
+            match place(trace) {
+                Some(to) => {
+                    seen.moved += u64::from(to != from);
+                    seen.ended.push(to);
+                }
+                None => seen.failed = Some(format!("a state that cannot be: {:?}", trace.choices())),
+            }
+        }
+        let mut rng = StreamKey::new(self.seed, 0, Purpose::TRUTH).stream(seen.begun, 0, 0);
+        seen.begun += 1;
+        let (state, log_joint) = self.posterior.draw(&mut rng);
+        if let Err(e) = trace.restore(&state, draws) {
+            seen.failed = Some(format!("restoring a state: {e}"));
+            return;
+        }
+        let now = trace.log_joint();
+        if let Some(expected) = log_joint
+            && (now - expected).abs() > 1e-7 * (1.0 + expected.abs())
+        {
+            seen.failed = Some(format!("log joint {now}, expected {expected}"));
+        }
+        seen.from = place(trace);
+        if seen.from.is_none() {
+            seen.failed = Some(format!("a draw that is not as it was made: {:?}", trace.choices()));
+        }
+    }
+
+    fn is_over(&self) -> bool {
+        self.seen.lock().is_ok_and(|s| s.failed.is_some())
+    }
+}
+
+/// Checks a plan on a program.
+pub fn check(text: &str, posterior: &Arc<Posterior>, plan: &Plan, passes: u64, seed: u64) -> Said {
+    let Plan { statements, kernels, .. } = plan;
+    let plan = format!(
+        "{text}
+{kernels}infer {{ warmup 60 {{ {statements} }} repeat {passes} {{ {statements} collect 1; }} }}\n"
+    );
+    let model = match Program::parse(&plan).and_then(Program::compile) {
+        Ok(m) => m,
+        Err(e) => return Said::Failed(format!("{e}")),
+    };
+    let (state, _) = posterior.draw(&mut StreamKey::new(seed, 1, Purpose::TRUTH).stream(0, 0, 0));
+    let draws = Draws { key: StreamKey::new(seed, 2, Purpose::VALUES), step: 0, lane: 0 };
+    let trace = match Trace::generate(model.code().clone(), state, draws, Limits::default()) {
+        Ok((t, _)) => t,
+        Err(e) => return Said::Failed(format!("{e}")),
+    };
+    let banks = statements.contains("knn").then(|| {
+        // Neighbours that have nothing to do with the data, and few of them.
+        let all: Vec<_> = (0..12).filter_map(|i| model.simulate(9, i).ok()).map(|t| Latent::all(&t)).collect();
+        Arc::new(Neighbours::new(all.iter().take(3).cloned().collect(), &all)) as _
+    });
+    let watch = Arc::new(Restart { posterior: Arc::clone(posterior), seed, seen: Mutex::default() });
+    let watched: Arc<dyn Watch> = watch.clone();
+    let options = RunOptions { seed, watch: Some(watched), banks, ..RunOptions::default() };
+    let plan = match model.plan() {
+        Ok((plan, _)) => plan,
+        Err(e) => return Said::Failed(format!("{e}")),
+    };
+    let done = run_from(model.code(), &plan, &options, &Progress::default(), &mut Discard, 0, trace);
+    let Ok(seen) = watch.seen.lock() else { return Said::Failed("the watch failed".into()) };
+    if let Some(e) = &seen.failed {
+        return Said::Failed(e.clone());
+    }
+    match done {
+        Ok(_) => count(posterior, &seen),
+        Err(ChainError::Run(e)) if e.message.contains("cannot be summed out") => Said::Refused(e.message.clone()),
+        Err(ChainError::Run(e)) if e.message.contains("only the surrogate asks") => Said::Refused(e.message.clone()),
+        Err(e) => Said::Failed(format!("{e:?}")),
+    }
+}
+
+fn count(posterior: &Posterior, seen: &Seen) -> Said {
+    let probabilities = posterior.probabilities();
+    let draws = seen.ended.len() as u64;
+    let mut counts = Counts { draws, cells: Vec::new() };
+    let mut pooled = Pooled::default();
+    let mut by_kind = vec![0; probabilities.len()];
+    seen.ended.iter().for_each(|(k, _)| by_kind[*k] += 1);
+    // Kinds that are seldom are one.
+    let (mut table, mut rest) = (Vec::new(), (0.0, 0));
+    for (i, (p, c)) in probabilities.iter().zip(&by_kind).enumerate() {
+        if p * draws as f64 >= 5.0 {
+            counts.cells.push((format!("kind {i}"), *p, *c));
+            table.push((*p, *c));
+        } else {
+            rest = (rest.0 + p, rest.1 + c);
+        }
+    }
+    counts.cells.push(("other kinds".into(), rest.0, rest.1));
+    match table.last_mut() {
+        Some(last) if rest.0 * (draws as f64) < 3.0 => *last = (last.0 + rest.0, last.1 + rest.1),
+        _ => table.push(rest),
+    }
+    pooled.add(draws, &table);
+    // The places of continuous choices are uniform, whatever the kind is.
+    let uniform = 1.0 / BINS as f64;
+    let dims = seen.ended.iter().map(|(_, u)| u.len()).max().unwrap_or(0);
+    for d in 0..dims {
+        let mut bins = [0u64; BINS];
+        let with = seen.ended.iter().filter_map(|(_, u)| u.get(d));
+        with.for_each(|u| bins[((u * BINS as f64) as usize).min(BINS - 1)] += 1);
+        let n: u64 = bins.iter().sum();
+        // How many have it is a matter of the kinds; where it is there it is uniform.
+        if n == draws {
+            counts
+                .cells
+                .extend(bins.iter().enumerate().map(|(b, c)| (format!("continuous {d}, bin {b}"), uniform, *c)));
+        } else {
+            let share: f64 = seen_share(posterior, d);
+            let cells = bins.iter().enumerate();
+            counts.cells.extend(cells.map(|(b, c)| (format!("continuous {d}, bin {b}"), uniform * share, *c)));
+        }
+        pooled.add(n, &bins.map(|c| (uniform, c)));
+    }
+    Said::Counted(counts, pooled, seen.moved as f64 / draws.max(1) as f64)
+}
+
+/// The chance that a state has more than `d` continuous choices.
+fn seen_share(posterior: &Posterior, d: usize) -> f64 {
+    posterior.kinds().filter(|(_, n)| *n > d).map(|(p, _)| p).sum()
+}
+
+/// Counts the kinds of states of a chain.
+struct Visits {
+    posterior: Arc<Posterior>,
+    counts: Mutex<Vec<f64>>,
+}
+
+impl std::fmt::Debug for Visits {
+    fn fmt(&self, f: &mut std::fmt::Formatter<'_>) -> std::fmt::Result {
+        f.write_str("visits")
+    }
+}
+
+impl Watch for Visits {
+    fn draw(&self, _chain: u32, trace: &mut Trace, _draws: Draws) {
+        if let (Ok(mut counts), Some((kind, _))) = (self.counts.lock(), self.posterior.place(trace)) {
+            counts[kind] += 1.0;
+        }
+    }
+}
+
+/// The distance in total variation between the kinds of states of four chains of a plan and the posterior.
+pub fn distance(text: &str, plan: &str, posterior: &Arc<Posterior>, seed: u64) -> f64 {
+    let longer = plan.replace("repeat 1000 {", "repeat 3000 { collect 1;");
+    let model = Program::parse(&format!("{text}\n{longer}")).and_then(Program::compile);
+    let model = model.unwrap_or_else(|e| panic!("{e}"));
+    let probabilities = posterior.probabilities();
+    let counts = Mutex::new(vec![0.0; probabilities.len()]);
+    let visits = Arc::new(Visits { posterior: Arc::clone(posterior), counts });
+    let watched: Arc<dyn Watch> = visits.clone();
+    let options = RunOptions { seed, watch: Some(watched), ..RunOptions::default() };
+    model.run(&options, 4, 2).unwrap_or_else(|e| panic!("{e}"));
+    let counts = visits.counts.lock().map(|c| c.clone()).unwrap_or_default();
+    let total: f64 = counts.iter().sum();
+    0.5 * counts.iter().zip(&probabilities).map(|(c, p)| (c / total - p).abs()).sum::<f64>()
+}

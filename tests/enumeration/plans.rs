@@ -1,0 +1,160 @@
+//! What is run on a program: every kernel, every grouping of what is summed out, the default plan, random mixes.
+
+use super::posterior::Posterior;
+use super::program::{Def, Dist, Effect, Item, Program};
+use pcadlang::rng::Stream;
+
+/// Statements, the kernels that they need declared, and the class that their draws are pooled in.
+#[derive(Clone)]
+pub struct Plan {
+    pub class: String,
+    pub statements: String,
+    pub kernels: String,
+}
+
+impl Plan {
+    fn of(class: impl Into<String>, statements: impl Into<String>) -> Plan {
+        Plan { class: class.into(), statements: statements.into(), kernels: String::new() }
+    }
+}
+
+/// Kernels for any choices.
+const ANY: &[&str] = &[
+    "mh(one(@**));",
+    "mh(each(@**));",
+    "block(@**);",
+    "block(one(@**));",
+    "drift(one(@**), 0.8);",
+    "drift(@**, 0.5);",
+    "drift(one(@**));",
+    "knn(@**, bank = \"b\");",
+    "knn(one(@**), bank = \"b\", k = 2);",
+    "temper(mh(one(@**)), levels = 3);",
+];
+const DISCRETE: &[&str] = &["gibbs(one($finite));", "gibbs(each($finite));"];
+const CONTINUOUS: &[&str] = &[
+    "slice(one($continuous));",
+    "slice($continuous, width = 0.3, doubling = true);",
+    "elliptical($gaussian);",
+    "elliptical(one($gaussian));",
+    "hmc($continuous, steps = 3);",
+    "mala($continuous);",
+    "nuts($continuous, max_depth = 4);",
+    "nuts(one($continuous), max_depth = 3);",
+];
+/// Kernels within `delayed`.
+const REVERSIBLE: &[&str] = &["mh(one(@**))", "gibbs(one($finite))", "block(@**)", "drift(one(@**), 0.7)"];
+/// Kernels that others can be summed out of.
+const SUMMING: &[&str] = &[
+    "hmc($continuous, steps = 2, marginal = %);",
+    "mala($continuous, marginal = %);",
+    "nuts($continuous, max_depth = 2, marginal = %);",
+];
+
+/// The most joint values that are summed out.
+const MOST_JOINT: usize = 36;
+
+/// The names of the observations that have surrogates.
+fn with_surrogates(p: &Program) -> Vec<String> {
+    fn of(p: &Program, e: &Effect, into: &mut Vec<String>) {
+        match e {
+            Effect::Observe(name, _, _, Some(_)) => into.push(p.names[*name].clone()),
+            Effect::Guarded(_, inner) => inner.iter().for_each(|e| of(p, e, into)),
+            _ => {}
+        }
+    }
+    let mut all = Vec::new();
+    for item in &p.items {
+        match item {
+            Item::Effect(e) => of(p, e, &mut all),
+            Item::Loop(_, _, effects) => effects.iter().for_each(|e| of(p, e, &mut all)),
+            Item::Def(_) | Item::Function(_) | Item::Memo(_) => {}
+        }
+    }
+    all
+}
+
+/// What to run on a program; all of it, or a few of each sort.
+pub fn plans(p: &Program, posterior: &Posterior, default: &str, rng: &mut Stream) -> Vec<Plan> {
+    let mut all: Vec<Plan> = Vec::new();
+    let class = |s: &str| s.split_once('(').map_or(s, |(name, _)| name).to_owned();
+    let mut some = |list: &[&str], n: usize, rng: &mut Stream| {
+        for _ in 0..n {
+            let k = list[rng.index(list.len())];
+            all.push(Plan::of(class(k), k));
+        }
+    };
+    some(ANY, 2, rng);
+    some(DISCRETE, 1, rng);
+    if posterior.has_continuous {
+        some(CONTINUOUS, 2, rng);
+    }
+    // Every grouping where there are few choices, else some of them and the whole; a step costs as much as joint values.
+    let sites: Vec<(&String, usize)> = posterior.discrete.iter().map(|(a, values)| (a, *values)).collect();
+    if posterior.has_continuous && !sites.is_empty() {
+        let whole = (1u64 << sites.len().min(60)) - 1;
+        let groupings: Vec<u64> = match sites.len() {
+            1 | 2 => (1..=whole).collect(),
+            _ => [whole].into_iter().chain((0..2).map(|_| 1 + rng.index(whole as usize) as u64)).collect(),
+        };
+        for g in groupings {
+            let (mut chosen, mut joint) = (Vec::new(), 1);
+            let begin = rng.index(sites.len());
+            for (i, (site, values)) in sites.iter().enumerate().cycle().skip(begin).take(sites.len()) {
+                if g >> i & 1 == 1 && joint * values <= MOST_JOINT {
+                    joint *= values;
+                    chosen.push(site.as_str());
+                }
+            }
+            let k = SUMMING[rng.index(SUMMING.len())];
+            all.push(Plan::of(format!("{} summing out", class(k)), k.replace('%', &chosen.join(" + "))));
+        }
+    }
+    let coarse = with_surrogates(p);
+    if !coarse.is_empty() {
+        let (k, y) = (REVERSIBLE[rng.index(REVERSIBLE.len())], &coarse[rng.index(coarse.len())]);
+        all.push(Plan::of("delayed", format!("delayed({k}, @{y});")));
+    }
+    if let Some(own) = own(p, posterior, rng) {
+        all.push(own);
+    }
+    if rng.uniform() < 0.5 {
+        all.push(Plan::of("default plan", default));
+    } else {
+        let pool: Vec<String> = all.iter().map(|p| p.statements.trim_end_matches(';').to_owned()).collect();
+        let kernels: String = all.iter().map(|p| &*p.kernels).collect();
+        let arm = |rng: &mut Stream| format!("{:?} => {};", 0.2 + rng.uniform(), pool[rng.index(pool.len())]);
+        let arms: String = (0..2 + rng.index(3)).map(|_| arm(rng) + " ").collect();
+        all.push(Plan { kernels, ..Plan::of("mix", format!("repeat 2 {{ mix {{ {arms}}} }}")) });
+    }
+    all
+}
+
+/// A kernel of the program's own: it proposes one or two top-level choices that are always there, by where they are.
+fn own(p: &Program, posterior: &Posterior, rng: &mut Stream) -> Option<Plan> {
+    let mut proposals = Vec::new();
+    for item in &p.items {
+        let Item::Def(Def::Draw(n, d)) = item else { continue };
+        let at = format!("@{}", p.names[*n]);
+        if !posterior.is_always_there(&at) {
+            continue;
+        }
+        let tenths = |from: usize, rng: &mut Stream| (from + rng.index(8)) as f64 / 10.0;
+        let (a, b, c) = (tenths(1, rng), tenths(1, rng), tenths(4, rng));
+        proposals.push(match d {
+            Dist::Flip(_) => format!("propose {at} ~ flip(if value({at}) {{ {a:?} }} else {{ {b:?} }});"),
+            Dist::Normal(..) => format!("propose {at} ~ normal({a:?} * value({at}) + {b:?}, {c:?});"),
+            // Where it would go may be none of its values.
+            _ => format!("propose {at} ~ categorical([{a:?} + value({at}), {b:?}, {c:?}]);"),
+        });
+    }
+    if proposals.is_empty() {
+        return None;
+    }
+    let first = rng.index(proposals.len());
+    let mut body = proposals.swap_remove(first);
+    if !proposals.is_empty() && rng.uniform() < 0.5 {
+        body += &format!(" {}", proposals[rng.index(proposals.len())]);
+    }
+    Some(Plan { kernels: format!("kernel moved() {{ {body} }}\n"), ..Plan::of("own kernel", "moved();") })
+}

@@ -1,0 +1,207 @@
+//! Small programs as trees, and their text.
+
+use std::fmt::{self, Display, Formatter, Write};
+
+/// A name, by its place in [`Program::names`].
+pub type Id = usize;
+
+/// An expression; it draws nothing by itself.
+#[derive(Clone, Debug)]
+pub enum Expr {
+    Num(f64),
+    Truth(bool),
+    Ref(Id),
+    /// The variable of the loop around.
+    Pass,
+    /// An element of a container of choices.
+    Element(Id, Box<Expr>),
+    Add(Box<Expr>, Box<Expr>),
+    Mul(Box<Expr>, Box<Expr>),
+    Equal(Box<Expr>, Box<Expr>),
+    Less(Box<Expr>, Box<Expr>),
+    And(Box<Expr>, Box<Expr>),
+    Or(Box<Expr>, Box<Expr>),
+    Not(Box<Expr>),
+    If(Box<Expr>, Box<Expr>, Box<Expr>),
+    /// An element of an array that is written out.
+    Table(Vec<Expr>, Box<Expr>),
+}
+
+/// A distribution.
+#[derive(Clone, Debug)]
+pub enum Dist {
+    Flip(Expr),
+    Categorical(Vec<Expr>),
+    /// Whole numbers from 0 to a last one.
+    Uniform(Expr),
+    Normal(Expr, Expr),
+    Poisson(Expr),
+}
+
+/// What a name is bound to.
+#[derive(Clone, Debug)]
+pub enum Right {
+    Plain(Expr),
+    /// A call of a function, by its place in [`Program::functions`].
+    Call(usize, Vec<Expr>),
+    /// A call of a function with `mem`.
+    Memo(usize, Expr),
+    /// Branches that may draw.
+    Branch(Expr, Body, Body),
+}
+
+#[derive(Clone, Debug)]
+pub enum Def {
+    Let(Id, Right),
+    Draw(Id, Dist),
+}
+
+#[derive(Clone, Debug)]
+pub struct Body {
+    pub defs: Vec<Def>,
+    pub result: Expr,
+}
+
+#[derive(Clone, Debug)]
+pub struct Function {
+    pub name: String,
+    pub params: Vec<Id>,
+    pub body: Body,
+}
+
+#[derive(Clone, Debug)]
+pub enum Effect {
+    /// An observation of a number (truth values are 0 and 1) under a name, maybe with a surrogate.
+    Observe(Id, Dist, f64, Option<Dist>),
+    Factor(Expr),
+    Guarded(Expr, Vec<Effect>),
+}
+
+#[derive(Clone, Debug)]
+pub enum Item {
+    /// A function, or one with `mem`, by its place.
+    Function(usize),
+    Memo(usize),
+    Def(Def),
+    /// A loop of so many passes; what it draws is keyed by the pass.
+    Loop(usize, Vec<Def>, Vec<Effect>),
+    Effect(Effect),
+}
+
+/// A program without its `infer` block.
+#[derive(Clone, Debug, Default)]
+pub struct Program {
+    pub names: Vec<String>,
+    pub functions: Vec<Function>,
+    pub memos: Vec<Function>,
+    pub items: Vec<Item>,
+}
+
+impl Program {
+    pub fn name(&mut self, text: &str) -> Id {
+        self.names.push(format!("{text}{}", self.names.len()));
+        self.names.len() - 1
+    }
+
+    fn list(&self, all: &[Expr]) -> String {
+        all.iter().map(|e| self.expr(e)).collect::<Vec<_>>().join(", ")
+    }
+
+    fn expr(&self, e: &Expr) -> String {
+        let two = |a: &Expr, op: &str, b: &Expr| format!("({} {op} {})", self.expr(a), self.expr(b));
+        match e {
+            Expr::Num(x) => format!("({x:?})"),
+            Expr::Truth(b) => format!("{b}"),
+            Expr::Ref(n) => self.names[*n].clone(),
+            Expr::Pass => "i".into(),
+            Expr::Element(n, k) => format!("{}[{}]", self.names[*n], self.expr(k)),
+            Expr::Add(a, b) => two(a, "+", b),
+            Expr::Mul(a, b) => two(a, "*", b),
+            Expr::Equal(a, b) => two(a, "==", b),
+            Expr::Less(a, b) => two(a, "<", b),
+            Expr::And(a, b) => two(a, "and", b),
+            Expr::Or(a, b) => two(a, "or", b),
+            Expr::Not(a) => format!("(not {})", self.expr(a)),
+            Expr::If(c, a, b) => {
+                format!("(if {} {{ {} }} else {{ {} }})", self.expr(c), self.expr(a), self.expr(b))
+            }
+            Expr::Table(all, k) => format!("[{}][{}]", self.list(all), self.expr(k)),
+        }
+    }
+
+    fn dist(&self, d: &Dist) -> String {
+        match d {
+            Dist::Flip(p) => format!("flip({})", self.expr(p)),
+            Dist::Categorical(w) => format!("categorical([{}])", self.list(w)),
+            Dist::Uniform(last) => format!("uniform_discrete(0, {})", self.expr(last)),
+            Dist::Normal(m, s) => format!("normal({}, {})", self.expr(m), self.expr(s)),
+            Dist::Poisson(r) => format!("poisson({})", self.expr(r)),
+        }
+    }
+
+    fn def(&self, d: &Def, keyed: bool, top: bool) -> String {
+        match d {
+            Def::Draw(n, d) if keyed => format!("{}[i] ~ {};", self.names[*n], self.dist(d)),
+            Def::Draw(n, d) if top => format!("assume {} ~ {};", self.names[*n], self.dist(d)),
+            Def::Draw(n, d) => format!("{} ~ {};", self.names[*n], self.dist(d)),
+            Def::Let(n, right) => {
+                let right = match right {
+                    Right::Plain(e) => self.expr(e),
+                    Right::Call(f, args) => format!("{}({})", self.functions[*f].name, self.list(args)),
+                    Right::Memo(f, arg) => format!("{}({})", self.memos[*f].name, self.expr(arg)),
+                    Right::Branch(c, a, b) => {
+                        format!("if {} {{ {} }} else {{ {} }}", self.expr(c), self.body(a), self.body(b))
+                    }
+                };
+                format!("let {} = {right};", self.names[*n])
+            }
+        }
+    }
+
+    fn body(&self, b: &Body) -> String {
+        let defs: String = b.defs.iter().map(|d| self.def(d, false, false) + " ").collect();
+        defs + &self.expr(&b.result)
+    }
+
+    fn effect(&self, e: &Effect) -> String {
+        match e {
+            Effect::Observe(name, d, y, coarse) => {
+                let value = if matches!(d, Dist::Flip(_)) { format!("{}", *y != 0.0) } else { format!("{y:?}") };
+                let coarse = coarse.as_ref().map_or(String::new(), |c| format!(" with coarse = {}", self.dist(c)));
+                format!("observe {} = {value}{coarse} as {};", self.dist(d), self.names[*name])
+            }
+            Effect::Factor(w) => format!("factor({});", self.expr(w)),
+            Effect::Guarded(c, inner) => {
+                let inner: String = inner.iter().map(|e| self.effect(e) + " ").collect();
+                format!("if {} {{ {inner}}}", self.expr(c))
+            }
+        }
+    }
+}
+
+impl Display for Program {
+    fn fmt(&self, f: &mut Formatter<'_>) -> fmt::Result {
+        let params = |g: &Function| g.params.iter().map(|p| self.names[*p].clone()).collect::<Vec<_>>().join(", ");
+        for item in &self.items {
+            match item {
+                Item::Function(i) => {
+                    let g = &self.functions[*i];
+                    writeln!(f, "fn {}({}) {{ {} }}", g.name, params(g), self.body(&g.body))?;
+                }
+                Item::Memo(i) => {
+                    let g = &self.memos[*i];
+                    writeln!(f, "let {} = mem(fn({}) {{ {} }});", g.name, params(g), self.body(&g.body))?;
+                }
+                Item::Def(d) => writeln!(f, "{}", self.def(d, false, true))?,
+                Item::Effect(e) => writeln!(f, "{}", self.effect(e))?,
+                Item::Loop(n, defs, effects) => {
+                    let mut inner = String::new();
+                    defs.iter().try_for_each(|d| write!(inner, "  {}\n", self.def(d, true, false)))?;
+                    effects.iter().try_for_each(|e| write!(inner, "  {}\n", self.effect(e)))?;
+                    writeln!(f, "for i in 0 .. {n} {{\n{inner}}}")?;
+                }
+            }
+        }
+        Ok(())
+    }
+}
