@@ -28,6 +28,7 @@ mod verdict;
 use check::{Said, check};
 use pcadlang::Model;
 use pcadlang::rng::{Purpose, StreamKey};
+use pcadlang::trace::{Change, Draws, Limits, Trace};
 use plans::Plan;
 use posterior::Posterior;
 use std::collections::BTreeMap;
@@ -35,8 +36,7 @@ use std::sync::Arc;
 use std::sync::atomic::{AtomicU64, Ordering};
 use verdict::Pooled;
 
-/// Draws of a first look, and of one that decides.
-const FIRST_LOOK: u64 = 200;
+/// Draws of a look that decides.
 const SECOND_LOOK: u64 = 10_000;
 /// What a first look finds suspicious, and what fails.
 const SUSPICIOUS: f64 = 1e-3;
@@ -98,7 +98,7 @@ impl Tally {
     fn plan(&mut self, seed: u64, text: &str, posterior: &Arc<Posterior>, plan: &Plan) {
         self.plans += 1;
         let wrong = |what: &str| format!("seed {seed}: {}\n{what}\n{text}{}", plan.statements, plan.kernels);
-        match check(text, posterior, plan, FIRST_LOOK, seed) {
+        match check(text, posterior, plan, plan.first_look(), seed) {
             Said::Refused(why) => {
                 let why = why.split_once(": ").map_or(why.clone(), |(_, w)| w.to_owned());
                 *self.refused.entry(why).or_default() += 1;
@@ -175,6 +175,61 @@ fn judge(all: &Tally) {
     }
 }
 
+/// Every way in which updates take short cuts gives what running the program again from the start gives: what the update weighs,
+/// what appears and vanishes, where it fails.
+fn updates_agree(seed: u64) -> u64 {
+    let (program, integration) = generate::program(seed);
+    let Some(posterior) = Posterior::of(&program, integration) else { return 0 };
+    let text = program.to_string();
+    let model = Model::from_text(&text).unwrap_or_else(|e| panic!("seed {seed}: {e}\n{text}"));
+    let key = StreamKey::new(seed, 3, Purpose::VALUES);
+    let (mut compared, mut rng) = (0, StreamKey::new(seed, 0, Purpose::MIX).stream(1, 0, 0));
+    for i in 0..6 {
+        let (state, _) = posterior.draw(&mut rng);
+        let made = |incremental: bool| {
+            let draws = Draws { key, step: i, lane: 0 };
+            let made = Trace::generate(model.code().clone(), state.clone(), draws, Limits::default());
+            let (mut trace, _) = made.unwrap_or_else(|e| panic!("seed {seed}: {e}\n{text}"));
+            trace.set_incremental(incremental);
+            trace
+        };
+        let (mut short, mut full) = (made(true), made(false));
+        let addresses: Vec<_> = short.choices().into_iter().map(|(a, ..)| a).collect();
+        if addresses.is_empty() {
+            continue;
+        }
+        // Several in a row, so that what one leaves behind is what the next begins with.
+        for step in 0..12 {
+            let a = &addresses[rng.index(addresses.len())];
+            let draws = Draws { key, step, lane: 1 + i };
+            let mut moved = |t: &mut Trace, keep: bool| {
+                let Some(target) = t.find(a) else { return "not there".to_owned() };
+                let said = match t.propose(&[(target, Change::Resample)], draws) {
+                    Ok(w) => format!("{w:?}"),
+                    Err(e) => format!("{:?} {}", e.kind, e.message),
+                };
+                if keep {
+                    t.commit()
+                } else {
+                    t.rollback()
+                }
+                format!("{said} {:?}", t.choices())
+            };
+            let keep = rng.uniform() < 0.7;
+            let (a, b) = (moved(&mut short, keep), moved(&mut full, keep));
+            assert_eq!(a, b, "seed {seed}, step {step}\n{text}");
+            compared += 1;
+        }
+    }
+    compared
+}
+
+#[test]
+fn short_cuts_of_updates_agree_with_running_everything_again() {
+    let compared: u64 = (0..300).map(updates_agree).sum();
+    assert!(compared > 10_000, "{compared}");
+}
+
 /// A number from the environment.
 fn number(name: &str, otherwise: u64) -> u64 {
     std::env::var(name).ok().and_then(|v| v.parse().ok()).unwrap_or(otherwise)
@@ -188,8 +243,6 @@ fn random_programs_keep_their_posterior() {
 #[test]
 #[ignore = "minutes"]
 fn many_random_programs_keep_their_posterior() {
-    let number =
-        |name: &str, otherwise: u64| std::env::var(name).ok().and_then(|v| v.parse().ok()).unwrap_or(otherwise);
     let first = number("FIRST", 1000);
     judge(&tally(first..first + number("ENUMERATED", 3000)));
 }

@@ -33,6 +33,11 @@ pub struct Spread {
     pub slots: Box<[Slot]>,
     /// Whether none of them reads anything of another block.
     pub is_closed: bool,
+    /// A bit for each of the slots: it may be asked for by nothing once conditions have changed, so it must not run before
+    /// they have.
+    pub conditional: u64,
+    /// Whether conditions of selections are among them.
+    pub turns: bool,
 }
 
 impl Code {

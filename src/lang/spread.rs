@@ -7,8 +7,8 @@
 use super::code::{DistSpec, Op, Operand, Slot, SlotFacts, Spread};
 use smallvec::SmallVec;
 
-/// The longest list worth keeping.
-const LONGEST: usize = 64;
+/// The longest list worth keeping; a bit each in [`Spread::conditional`].
+const LONGEST: usize = u64::BITS as usize;
 
 /// The spread of the choice in slot `from` of a block, if it is the same in every state.
 pub(super) fn spread(ops: &[Op], slots: &[SlotFacts], from: Slot) -> Option<Spread> {
@@ -18,7 +18,31 @@ pub(super) fn spread(ops: &[Op], slots: &[SlotFacts], from: Slot) -> Option<Spre
         return None;
     }
     let is_closed = reads_inside(ops, from, &order);
-    Some(Spread { slots: order.into(), is_closed })
+    let asked = always_asked(ops, slots);
+    let bits = order.iter().enumerate().filter(|(_, s)| !asked[**s as usize]);
+    let conditional = bits.fold(0, |all, (i, _)| all | 1 << i);
+    let decides = |o: &Operand| matches!(o, Operand::Local(s) if *s == from || order.contains(s));
+    let turns = order.iter().any(|s| matches!(&ops[*s as usize], Op::Select { cond, .. } if decides(cond)));
+    Some(Spread { slots: order.into(), is_closed, conditional, turns })
+}
+
+/// Which slots effects of their block ask for whatever conditions say.
+fn always_asked(ops: &[Op], slots: &[SlotFacts]) -> Vec<bool> {
+    let mut asked: Vec<bool> = slots.iter().map(|s| s.is_effect).collect();
+    let mut open: Vec<usize> = (0..slots.len()).filter(|s| asked[*s]).collect();
+    while let Some(slot) = open.pop() {
+        let mut ask = |s: Slot| {
+            if !std::mem::replace(&mut asked[s as usize], true) {
+                open.push(s as usize);
+            }
+        };
+        match (&ops[slot], &slots[slot].reads) {
+            (Op::Select { cond: Operand::Local(s), .. }, _) => ask(*s),
+            (_, Some(reads)) => reads.iter().filter(|(up, _)| *up == 0).for_each(|(_, s)| ask(*s)),
+            _ => {}
+        }
+    }
+    asked
 }
 
 /// Whether all that these dependents of a slot read is in order when they run: in their list, or of this block through and

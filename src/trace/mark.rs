@@ -181,7 +181,7 @@ impl Graph {
         }
     }
 
-    fn make_stale(&mut self, code: &Code, n: NodeId) {
+    pub(super) fn make_stale(&mut self, code: &Code, n: NodeId) {
         self.save(n);
         self.nodes[n as usize].state = State::Stale;
         let facts = self.slot_facts(code, n);

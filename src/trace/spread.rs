@@ -1,7 +1,8 @@
 //! Updates of one choice whose change spreads through its own frame in a known order (see [`crate::lang::code::Spread`]).
 //!
 //! The general way marks all that may change and asks for it; here the list is known, so each entry runs at once if
-//! something it reads has changed. What is outside of the frame is marked afterwards and runs the general way. Both ways
+//! something it reads has changed. What is outside of the frame is marked afterwards and runs the general way, and so is what
+//! nothing may ask for any more: run too soon it could fail, or draw choices, though the new state has no use for it. Both ways
 //! give the same values and the same exact sums.
 
 use super::choices::Target;
@@ -13,8 +14,9 @@ use crate::lang::code::{Code, Spread};
 use crate::lang::value::Value;
 
 impl Graph {
-    /// How the change of a choice spreads, if it can be updated this way in this state.
-    pub fn spread_of<'c>(&self, code: &'c Code, target: Target) -> Option<&'c Spread> {
+    /// How the change of a choice spreads, if it can be updated this way in this state, and which of its slots run only if they
+    /// are asked for, a bit each.
+    pub fn spread_of<'c>(&self, code: &'c Code, target: Target) -> Option<(&'c Spread, u64)> {
         let facts = self.slot_facts(code, target.node);
         let spread = facts.spread.as_ref()?;
         if !self.incremental || self.nodes[target.node as usize].state != State::Clean {
@@ -32,7 +34,8 @@ impl Graph {
             }
         }
         // What is outside may come back to what reads from there: then only the general way has the right order.
-        (spread.is_closed || !leaves).then_some(spread)
+        let conditional = if leaves || spread.turns { spread.conditional } else { 0 };
+        (spread.is_closed || !leaves).then_some((spread, conditional))
     }
 
     /// Whether nodes of other frames read this one.
@@ -47,7 +50,7 @@ impl Graph {
         code: &Code,
         target: Target,
         change: &Change,
-        spread: &Spread,
+        (spread, conditional): (&Spread, u64),
     ) -> Result<(), Failure> {
         let n = target.node;
         self.pending.push(Pending { node: n, element: target.element, change: change.clone() });
@@ -55,14 +58,19 @@ impl Graph {
         self.nodes[n as usize].flags |= TARGET;
         self.rerun(code, n)?;
         let base = n - self.slot_facts(code, n).slot;
-        for slot in &spread.slots {
+        for (i, slot) in spread.slots.iter().enumerate() {
             let m = base + slot;
             if self.nodes[m as usize].state == State::Clean && self.reads_changed(code, m) {
-                self.rerun(code, m)?;
+                if conditional >> i & 1 == 0 {
+                    self.rerun(code, m)?;
+                } else {
+                    self.make_stale(code, m);
+                }
             }
         }
         for m in std::iter::once(n).chain(spread.slots.iter().map(|slot| base + slot)) {
-            if self.nodes[m as usize].changed == self.epoch && self.is_read_outside(m) {
+            let node = &self.nodes[m as usize];
+            if (node.changed == self.epoch || node.state == State::Stale) && self.is_read_outside(m) {
                 self.mark_outside_users(code, m);
             }
         }
@@ -71,7 +79,10 @@ impl Graph {
 
     fn reads_changed(&self, code: &Code, n: NodeId) -> bool {
         let mut changed = false;
-        self.each_dep(code, n, |d, _| changed |= self.nodes[d as usize].changed == self.epoch);
+        self.each_dep(code, n, |d, _| {
+            let dep = &self.nodes[d as usize];
+            changed |= dep.changed == self.epoch || dep.state == State::Stale;
+        });
         changed
     }
 

@@ -13,6 +13,11 @@ pub struct Plan {
 }
 
 impl Plan {
+    /// How many draws a first look takes: fewer of what costs most, so that more programs are looked at.
+    pub fn first_look(&self) -> u64 {
+        if self.statements.contains("marginal") { 80 } else { 200 }
+    }
+
     fn of(class: impl Into<String>, statements: impl Into<String>) -> Plan {
         Plan { class: class.into(), statements: statements.into(), kernels: String::new() }
     }
@@ -52,7 +57,7 @@ const SUMMING: &[&str] = &[
 ];
 
 /// The most joint values that are summed out.
-const MOST_JOINT: usize = 36;
+const MOST_JOINT: usize = 24;
 
 /// The names of the observations that have surrogates.
 fn with_surrogates(p: &Program) -> Vec<String> {
@@ -142,7 +147,7 @@ fn own(p: &Program, posterior: &Posterior, rng: &mut Stream) -> Option<Plan> {
         let tenths = |from: usize, rng: &mut Stream| (from + rng.index(8)) as f64 / 10.0;
         let (a, b, c) = (tenths(1, rng), tenths(1, rng), tenths(4, rng));
         proposals.push(match d {
-            Dist::Flip(_) => format!("propose {at} ~ flip(if value({at}) {{ {a:?} }} else {{ {b:?} }});"),
+            Dist::Flip(_) => format!("propose {at} ~ flip({a:?});"),
             Dist::Normal(..) => format!("propose {at} ~ normal({a:?} * value({at}) + {b:?}, {c:?});"),
             // Where it would go may be none of its values.
             _ => format!("propose {at} ~ categorical([{a:?} + value({at}), {b:?}, {c:?}]);"),
