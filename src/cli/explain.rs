@@ -16,7 +16,7 @@ use std::collections::{BTreeMap, HashSet};
 /// Proposals that draw something that are wanted of each group: what a thread keeps of pictures is made by the first ones.
 const WANTED: u32 = 4;
 
-/// Proposals that are tried for them: a choice that comes out as it was draws nothing.
+/// Proposals that are tried for them: a choice that comes out as it was draws nothing, so a few say little.
 const TRIES: u64 = 64;
 
 /// Choices whose addresses differ in keys only.
@@ -222,7 +222,7 @@ fn redrawn(w: Option<&Work>) -> String {
     let Some(w) = w else { return "impossible in this state".into() };
     let pictures = w.whole + w.partial;
     if pictures == 0 {
-        return "no picture".into();
+        return format!("no picture in {TRIES} proposals");
     }
     let mut s = format!("{} drawn ({})", count(w.drawn, "mesh"), count(w.triangles, "triangle"));
     s += &format!(", {} kept", w.kept);

@@ -29,7 +29,7 @@ impl Session {
             s += &format!("read by {}\n", names.join(", "));
         }
         if reach.terms.is_empty() {
-            s += "nothing that is scored depends on it\n";
+            s += "nothing that is scored depends on it in this state\n";
             return Ok(Reply::text(s));
         }
         let mut rows = vec![["depends on it", "", "log density", ""].map(str::to_owned).to_vec()];
