@@ -149,8 +149,12 @@ fn own(p: &Program, posterior: &Posterior, rng: &mut Stream) -> Option<Plan> {
         proposals.push(match d {
             Dist::Flip(_) => format!("propose {at} ~ flip({a:?});"),
             Dist::Normal(..) => format!("propose {at} ~ normal({a:?} * value({at}) + {b:?}, {c:?});"),
-            // Where it would go may be none of its values.
-            _ => format!("propose {at} ~ categorical([{a:?} + value({at}), {b:?}, {c:?}]);"),
+            Dist::Categorical(values) => {
+                let others = format!(", {b:?}, {c:?}");
+                let others = if values.len() == 2 { &others[..others.len() / 2] } else { &others };
+                format!("propose {at} ~ categorical([{a:?} + value({at}){others}]);")
+            }
+            _ => continue,
         });
     }
     if proposals.is_empty() {

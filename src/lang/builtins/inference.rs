@@ -27,8 +27,8 @@ const MARGINAL: Arg = opt(
     "marginal",
     Type::Selection,
     "none",
-    "Finite discrete choices that are summed out of the density it sees, then drawn given the rest. Those that share no \
-     observation are summed one by one, others jointly.",
+    "Finite discrete choices that are summed out of the density it sees, then drawn given the rest. Those that no score \
+     can read together are summed one by one, others jointly (at most 1000 joint values). What cannot be summed out is refused.",
 );
 const INNER: Arg = arg("move", Type::Kernel, "The kernel inside.");
 const X: Arg = arg("x", Type::Any, "A number of the model, as in `collect`.");
