@@ -89,7 +89,7 @@ pub fn check(text: &str, posterior: &Arc<Posterior>, plan: &Plan, passes: u64, s
     let Plan { statements, kernels, .. } = plan;
     let plan = format!(
         "{text}
-{kernels}infer {{ warmup 30 {{ {statements} }} repeat {passes} {{ {statements} collect 1; }} }}\n"
+{kernels}infer {{ warmup 20 {{ {statements} }} repeat {passes} {{ {statements} collect 1; }} }}\n"
     );
     let model = match Program::parse(&plan).and_then(Program::compile) {
         Ok(m) => m,

@@ -15,7 +15,7 @@ pub struct Plan {
 impl Plan {
     /// How many draws a first look takes: fewer of what costs most, so that more programs are looked at.
     pub fn first_look(&self) -> u64 {
-        if self.statements.contains("marginal") { 80 } else { 200 }
+        if self.statements.contains("marginal") { 60 } else { 200 }
     }
 
     fn of(class: impl Into<String>, statements: impl Into<String>) -> Plan {
@@ -100,7 +100,7 @@ pub fn plans(p: &Program, posterior: &Posterior, default: &str, rng: &mut Stream
         let whole = (1u64 << sites.len().min(60)) - 1;
         let groupings: Vec<u64> = match sites.len() {
             1 | 2 => (1..=whole).collect(),
-            _ => [whole].into_iter().chain((0..2).map(|_| 1 + rng.index(whole as usize) as u64)).collect(),
+            _ => [whole].into_iter().chain((0..1).map(|_| 1 + rng.index(whole as usize) as u64)).collect(),
         };
         for g in groupings {
             let (mut chosen, mut joint) = (Vec::new(), 1);

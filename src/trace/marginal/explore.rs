@@ -9,6 +9,7 @@ use super::partition::Partition;
 use super::reads::{Found, Label, Reader};
 use super::{Group, Marginal, Sums};
 use crate::lang::code::Op;
+use crate::lang::error::FaultKind;
 use crate::trace::node::*;
 use crate::trace::{Change, Draws, Target, Trace, TraceResult, Weight};
 use rustc_hash::{FxHashMap, FxHashSet};
@@ -148,7 +149,7 @@ impl Trace {
             while let Some(look) = table.next() {
                 let mut changes = at.to_vec();
                 m.put(&table.groups, &look, &mut changes);
-                let weight = match self.attempt(&changes, &own, &mut m.partition, draws)? {
+                let weight = match self.attempt(&changes, &own, m, draws)? {
                     Ok(weight) => weight,
                     Err(label) if label.site == NONE => return Ok(Explored::Nowhere),
                     Err(label) => {
@@ -183,7 +184,7 @@ impl Trace {
                     return Err(self.cannot_sum(m.sites[0], why));
                 }
                 found.scores.extend(read.scores);
-                found.owners.extend(read.owners);
+                read.owners.iter().for_each(|(n, site)| found.own(*n, *site, &mut m.partition));
                 found.structure_moves |= read.structure_moves;
                 found.values_move |= read.values_move;
                 table.enter(look);
@@ -200,7 +201,7 @@ impl Trace {
         &mut self,
         changes: &[(Target, Change)],
         own: &FxHashMap<NodeId, Label>,
-        partition: &mut Partition,
+        m: &mut Marginal,
         draws: Draws,
     ) -> TraceResult<Result<Weight, Label>> {
         self.rollback();
@@ -211,7 +212,7 @@ impl Trace {
             Err(e) if e.is_recoverable() => {
                 let failed = std::mem::take(&mut self.graph.failed);
                 let new = failed.last().filter(|n| self.is_improper_draw(**n)).copied();
-                let label = Reader::new(&self.graph, &self.code, own, partition).read_failed(&failed);
+                let label = Reader::new(&self.graph, &self.code, own, &mut m.partition).read_failed(&failed);
                 self.graph.rollback(&self.code, before);
                 match new {
                     Some(node) => {
@@ -219,6 +220,12 @@ impl Trace {
                     }
                     None => Ok(Err(label)),
                 }
+            }
+            // A choice that stays, in a frame that goes, and the same choice in the frame that comes instead.
+            Err(e) if e.kind == FaultKind::Duplicate => {
+                let refused = self.check_held(m.sites[0]).err();
+                self.graph.rollback(&self.code, before);
+                Err(refused.unwrap_or(e))
             }
             settled => self.pend(before, settled).map(Ok),
         }
@@ -229,13 +236,13 @@ impl Trace {
             && self.graph.dist_of(&self.code, n).is_some_and(|d| d.is_improper())
     }
 
-    /// Whether a frame goes of which a choice is to stay.
+    /// Whether a frame goes of which a choice is to stay, or a loop that has some.
     fn check_held(&self, t: Target) -> TraceResult<()> {
         let g = &self.graph;
         let stays = |f: &FrameId| {
             let frame = &g.frames[*f as usize];
             let mut nodes = frame.base..frame.base + self.code.blocks[frame.block as usize].len() as u32;
-            nodes.any(|n| g.nodes[n as usize].refs > 0 && matches!(g.op(&self.code, n), Op::Draw { .. }))
+            nodes.any(|n| g.nodes[n as usize].refs > 0)
         };
         match g.detached.iter().any(stays) {
             true => Err(self.cannot_sum(t, "other choices appear or vanish with it")),

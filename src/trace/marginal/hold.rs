@@ -3,6 +3,7 @@
 use super::Marginal;
 use super::explore::Explored;
 use crate::dist::{Datum, Support};
+use crate::lang::code::Op;
 use crate::lang::key::Key;
 use crate::trace::journal::Entry;
 use crate::trace::node::*;
@@ -16,6 +17,8 @@ const BY_CHANCE: &str = "what it asks for depends on choices that are drawn for 
 #[derive(Debug, Default)]
 pub(crate) struct Held {
     nodes: Vec<NodeId>,
+    /// The loops that they are in: their frames stay too.
+    loops: Vec<NodeId>,
     /// Entries of functions with `mem`, by frame: those that choices are in.
     frames: Vec<FrameId>,
     entries: Vec<(NodeId, Key)>,
@@ -143,7 +146,7 @@ impl Trace {
         self.graph.begin();
         for n in &new {
             self.graph.acquire(*n, *n, false);
-            self.hold_entries(*n, held);
+            self.hold_frames(*n, held);
         }
         self.graph.commit(&self.code);
         held.nodes.extend(new);
@@ -161,8 +164,8 @@ impl Trace {
         }
     }
 
-    /// Holds the entries of functions with `mem` that a choice is in, as a call does.
-    fn hold_entries(&mut self, n: NodeId, held: &mut Held) {
+    /// Holds the loops and the entries of functions with `mem` that a choice is in, as who reads it or calls them does.
+    fn hold_frames(&mut self, n: NodeId, held: &mut Held) {
         let mut f = self.graph.nodes[n as usize].frame;
         while self.graph.frames[f as usize].owner != NONE {
             let (owner, key) = (self.graph.frames[f as usize].owner, self.graph.frames[f as usize].key.clone());
@@ -176,6 +179,12 @@ impl Trace {
                 self.graph.note(Entry::Memo(owner, key.clone(), Some(old)));
                 held.frames.push(f);
                 held.entries.push((owner, key));
+            }
+            if matches!(self.graph.op(&self.code, owner), Op::For { .. } | Op::Map { .. })
+                && !held.loops.contains(&owner)
+            {
+                self.graph.acquire(owner, owner, false);
+                held.loops.push(owner);
             }
             f = self.graph.nodes[owner as usize].frame;
         }
@@ -191,7 +200,7 @@ impl Trace {
             return Ok(());
         }
         let before = self.graph.begin();
-        held.nodes.iter().for_each(|n| self.graph.release(*n, false));
+        held.nodes.iter().chain(&held.loops).for_each(|n| self.graph.release(*n, false));
         held.entries.iter().for_each(|(memo, key)| self.graph.leave_memo(*memo, key));
         let settled = self.graph.settle(&self.code);
         self.pend(before, settled)?;

@@ -38,8 +38,9 @@ enum Seen {
 pub(super) struct Found {
     /// Scores that depend on a choice: the node, and one choice of the group.
     pub scores: Vec<(NodeId, u32)>,
-    /// Nodes whose observations and factors come and go with a choice, and one choice of the group.
-    pub owners: Vec<(NodeId, u32)>,
+    /// Nodes whose observations and factors come and go with a choice, or have other places in each state and depend on one: the
+    /// choice.
+    pub owners: FxHashMap<NodeId, u32>,
     /// The choices that observations and factors ask for.
     pub asked: Vec<NodeId>,
     /// Whether what is read depends on choices that the kernel moves.
@@ -50,6 +51,14 @@ pub(super) struct Found {
     pub anywhere: bool,
     /// Whether observations come and go in a way that is not followed.
     pub unclear: bool,
+}
+
+impl Found {
+    /// What is below a node depends on a choice: all such choices are in one group.
+    pub fn own(&mut self, owner: NodeId, site: u32, partition: &mut Partition) {
+        let first = *self.owners.entry(owner).or_insert(site);
+        partition.join(first, site);
+    }
 }
 
 pub(super) struct Reader<'a> {
@@ -128,10 +137,10 @@ impl<'a> Reader<'a> {
         let own = if is_score { read } else { self.decided(n) };
         let label = self.join(own, placed);
         match owner {
-            Some(owner) => self.found.owners.push((owner, label.site)),
-            None if label.site == NONE => {}
+            _ if label.site == NONE => {}
+            Some(owner) => self.found.own(owner, label.site, self.partition),
             None if is_score => self.found.scores.push((n, label.site)),
-            None => self.found.owners.push((n, label.site)),
+            None => self.found.own(n, label.site, self.partition),
         }
     }
 
@@ -225,7 +234,8 @@ impl<'a> Reader<'a> {
         label
     }
 
-    /// What decides that a node is there, and the outermost node around it that a choice decides about.
+    /// What decides that a node is there, and the outermost node around it that a choice decides about, also one that moves:
+    /// frames that are made for a proposal have other nodes in each.
     fn placed(&mut self, n: NodeId) -> (Label, Option<NodeId>) {
         let (mut label, mut outermost, mut in_memo) = (NOTHING, None, false);
         let mut owner = self.graph.frames[self.graph.nodes[n as usize].frame as usize].owner;
@@ -236,7 +246,7 @@ impl<'a> Reader<'a> {
                 self.found.anywhere = true;
                 decided.site = 0;
             }
-            if decided.site != NONE {
+            if decided.site != NONE || decided.moves {
                 self.found.unclear |= in_memo;
                 outermost = Some(owner);
             }

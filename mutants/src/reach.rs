@@ -1,0 +1,57 @@
+//! Which tests come by which mutants, from one run of all tests.
+
+use crate::Failure;
+use crate::build::TestProgram;
+use std::collections::BTreeSet;
+use std::path::Path;
+use std::process::{Command, Stdio};
+use std::time::{Duration, Instant};
+
+/// A program of tests, how long it takes, and what it comes by.
+pub struct Reached {
+    pub test: TestProgram,
+    pub takes: Duration,
+    /// By mutant: the tests whose own threads came by it.
+    pub tests: Vec<BTreeSet<String>>,
+    /// By mutant: whether any thread did.
+    pub any: Vec<bool>,
+}
+
+/// Runs all test programs that pass without a mutant, the quick ones first.
+pub fn reached(copy: &Path, tests: &[TestProgram], mutants: usize) -> Result<Vec<Reached>, Failure> {
+    let mut all = Vec::new();
+    for test in tests {
+        let folder = copy.join("target/reached").join(&test.name);
+        let _ = std::fs::remove_dir_all(&folder);
+        std::fs::create_dir_all(&folder)?;
+        let before = Instant::now();
+        let done = Command::new(&test.path)
+            .current_dir(copy)
+            .env("MUTANTS_REACHED", &folder)
+            .env("INSTA_UPDATE", "no")
+            .stdout(Stdio::null())
+            .stderr(Stdio::null())
+            .status()?;
+        let takes = before.elapsed();
+        if !done.success() {
+            println!("{} fails without a mutant: left out", test.name);
+            continue;
+        }
+        let mut r =
+            Reached { test: test.clone(), takes, tests: vec![BTreeSet::new(); mutants], any: vec![false; mutants] };
+        for file in std::fs::read_dir(&folder)? {
+            for line in std::fs::read_to_string(file?.path())?.lines() {
+                let Some((id, name)) = line.split_once('\t') else { continue };
+                let Some(id) = id.parse::<usize>().ok().filter(|id| *id < mutants) else { continue };
+                r.any[id] = true;
+                if !name.is_empty() && name != "main" {
+                    r.tests[id].insert(name.to_owned());
+                }
+            }
+        }
+        println!("{}: {:.1} s, comes by {} mutants", test.name, takes.as_secs_f64(), r.any.iter().filter(|a| **a).count());
+        all.push(r);
+    }
+    all.sort_by_key(|r| r.takes);
+    Ok(all)
+}
