@@ -27,6 +27,8 @@ mod verdict;
 
 use check::{Said, check};
 use pcadlang::Model;
+use pcadlang::infer::calibration::{PlanSampler, Settings, geweke};
+use pcadlang::infer::{Progress, RunOptions};
 use pcadlang::rng::{Purpose, StreamKey};
 use pcadlang::trace::{Change, Draws, Limits, Trace};
 use plans::Plan;
@@ -230,6 +232,41 @@ fn short_cuts_of_updates_agree_with_running_everything_again() {
     assert!(compared > 10_000, "{compared}");
 }
 
+/// Geweke's joint distribution test of a random program whose observations have joint conditions, with discrete choices summed
+/// out; `None` if it has none, if there are observations by chance, or if what is to be summed out is refused.
+fn joint_distribution_stays(seed: u64) -> Option<()> {
+    let (program, integration) = generate::program(seed);
+    let posterior = Posterior::of(&program, integration)?;
+    let text = program.to_string();
+    let joint = text.lines().any(|l| l.trim_start().starts_with("observe") && l.contains(" and "));
+    let sites: Vec<&str> = posterior.discrete.keys().map(String::as_str).take(3).collect();
+    if !joint || !posterior.has_continuous || sites.len() < 2 || text.contains("factor") || text.contains("{ observe") {
+        return None;
+    }
+    let kernels = format!(
+        "hmc($continuous, steps = 3, marginal = {}); gibbs(each($finite)); mh(one(@**)); slice(one($continuous));",
+        sites.join(" + ")
+    );
+    let model =
+        Model::from_text(&format!("{text}infer {{ warmup 30 {{ {kernels} }} repeat 60 {{ {kernels} }} }}")).ok()?;
+    let (plan, _) = model.plan().ok()?;
+    let progress = Progress::default();
+    let sampler =
+        PlanSampler { plan: &plan, options: RunOptions { seed, ..RunOptions::default() }, progress: &progress };
+    let settings = Settings { replicates: 60, seed, threads: 2, ..Settings::default() };
+    let said = geweke(model.code(), &sampler, &settings).ok()?;
+    assert!(said.passes(), "seed {seed}: {said:#?}\n{text}");
+    Some(())
+}
+
+#[test]
+#[ignore = "a minute"]
+fn data_and_choices_by_turns_keep_their_joint_distribution() {
+    let ten = (0..400).filter_map(|seed| joint_distribution_stays(seed).map(|()| seed)).take(10);
+    let seeds: Vec<u64> = ten.collect();
+    assert_eq!(seeds.len(), 10, "{seeds:?}");
+}
+
 /// A number from the environment.
 fn number(name: &str, otherwise: u64) -> u64 {
     std::env::var(name).ok().and_then(|v| v.parse().ok()).unwrap_or(otherwise)
@@ -238,6 +275,26 @@ fn number(name: &str, otherwise: u64) -> u64 {
 #[test]
 fn random_programs_keep_their_posterior() {
     judge(&tally(0..60));
+}
+
+/// Seeds and plans that found errors.
+const ONCE_WRONG: [(u64, &str); 4] = [
+    (3846, "slice(one($continuous));"),
+    (100_158, "hmc($continuous, steps = 2, marginal = @z10[0] + @z9[1]);"),
+    (103_111, "hmc($continuous, steps = 2, marginal = @z4[1] + @d0 + @z3[0]);"),
+    (106_735, "mala($continuous, marginal = @z9[2] + @d0);"),
+];
+
+#[test]
+fn plans_that_were_wrong_once() {
+    let mut all = Tally::default();
+    for (seed, statements) in ONCE_WRONG {
+        let (program, integration) = generate::program(seed);
+        let posterior = Posterior::of(&program, integration).unwrap_or_else(|| panic!("{seed} is not enumerated"));
+        all.plan(seed, &program.to_string(), &Arc::new(posterior), &Plan::of("once wrong", statements));
+    }
+    judge(&all);
+    assert!(all.refused.is_empty(), "{:?}", all.refused);
 }
 
 #[test]

@@ -18,7 +18,7 @@ impl Plan {
         if self.statements.contains("marginal") { 60 } else { 200 }
     }
 
-    fn of(class: impl Into<String>, statements: impl Into<String>) -> Plan {
+    pub fn of(class: impl Into<String>, statements: impl Into<String>) -> Plan {
         Plan { class: class.into(), statements: statements.into(), kernels: String::new() }
     }
 }
