@@ -204,6 +204,19 @@ fn nothing_is_learnt_after_warm_up() {
     }
 }
 
+/// Without a warm-up a step size, or a ladder, is found once, and stays.
+#[test]
+fn what_was_not_warmed_up_is_found_once() {
+    for (name, text, kernel, of) in CASES.iter().filter(|(_, text, _, _)| *text != BRANCHES) {
+        let all = states(&model(text, kernel), 3, 0, 60);
+        // `abc` with particles finds its ladder as soon as one of them comes near enough.
+        let mut states: Vec<_> = all.iter().filter(|(step, _)| *step >= 1).map(|(_, s)| learnt(*of, &s[0])).collect();
+        let (count, most) = (states.len(), if kernel.contains("moves") || *name == "abc" { 2 } else { 1 });
+        states.dedup();
+        assert!(count > 30 && states.len() <= most, "{name}: {kernel} goes on learning");
+    }
+}
+
 /// Where choices come and go, a metric is a function of what choices there are, whatever there was in between.
 #[test]
 fn a_metric_depends_on_nothing_but_the_choices_there_are() {
@@ -211,6 +224,13 @@ fn a_metric_depends_on_nothing_but_the_choices_there_are() {
     // Of several seeds, since a branch may change just where a window ends, which leaves one state to tell a variance from.
     for (kernel, seed) in kernels.iter().flat_map(|k| (0..6).map(move |seed| (*k, seed))) {
         let all = states(&model(BRANCHES, kernel), seed, 400, 150);
+        let of = |step: u64| {
+            let (_, states) = all.iter().rfind(|(s, _)| *s <= step).unwrap();
+            let adaptation = read(&states[0]).as_array().unwrap()[0].clone();
+            field(&adaptation, "learnt").as_map().unwrap().len()
+        };
+        // Nothing of it is lost again, by the choices that it is of.
+        assert!((1..550).all(|step| of(step) <= of(step + 1)) && of(400) > 1, "{kernel}: a metric is forgotten");
         let mut seen: Vec<(Value, Vec<Value>)> = Vec::new();
         for (_, states) in all.iter().filter(|(step, _)| *step >= 400) {
             let adaptation = read(&states[0]).as_array().unwrap()[0].clone();

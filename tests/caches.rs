@@ -58,7 +58,7 @@ fn cameras(projection: Projection) -> Vec<(String, Camera)> {
         }
     }
     add("width".into(), &|c| c.width += 1);
-    add("height".into(), &|c| c.height += 1);
+    add("height".into(), &|c| c.height -= 20);
     for k in 0..3 {
         add(format!("number {k} of the projection"), &|c| {
             c.projection = match c.projection {
@@ -125,6 +125,29 @@ fn pictures_of_another_camera() {
             }
         }
     }
+}
+
+/// The kind of projection alone: a scene so large that one number is good as focal length and as size of a pixel.
+#[test]
+fn pictures_of_another_kind_of_camera() {
+    let by = Affine::new(DVec3::ZERO, DVec3::ZERO, DVec3::splat(800.0));
+    let members: Vec<Solid> = (0..6).map(|i| ball(0.4 * f64::from(i) - 1.0, 0.5).placed(by)).collect();
+    let moved = Solid::group(&[&members[..5], &[ball(1.1, 0.3).placed(by)]].concat());
+    let still = Solid::group(&members);
+    let (scale, cx, cy) = (80.0, 36.0, 28.0);
+    let kinds =
+        [Projection::Pinhole { focal_px: scale, cx, cy }, Projection::Orthographic { units_per_pixel: scale, cx, cy }];
+    let mut seen = Vec::new();
+    for i in 0..8 {
+        let base = Camera { projection: kinds[i % 2], ..Camera::default_for(72, 56) };
+        let camera = Camera { eye: DVec3::new(0.0, 0.0, 6400.0), ..base };
+        for solid in [&still, &moved, &still] {
+            let here = contour_bits(&Contours::of(solid, &camera));
+            assert!(here == afresh(|| contour_bits(&Contours::of(solid, &camera))), "another kind of projection");
+            seen.push(here);
+        }
+    }
+    assert!(seen[0] != seen[3] && seen[0] != seen[1] && seen[0].len() > 100);
 }
 
 /// Another mesh at the same place, in the memory of one that is gone; another placement by one number.
@@ -207,8 +230,20 @@ fn surfaces_of_other_numbers() {
             assert_eq!(here == make(a), a.0 == b.0, "{} and {}", a.0, b.0);
         }
     }
+    // Of as many rings, and another number of parts.
     let ball = || mesh_bits(&sphere(0.7, 12).unwrap());
-    assert!(ball() == afresh(ball));
+    for points in 3..30 {
+        let at = |i: usize| std::f64::consts::PI * i as f64 / (points - 1) as f64;
+        let r = (0..points).map(|i| if i == 0 || i == points - 1 { 0.0 } else { libm::sin(at(i)) }).collect();
+        let egg =
+            ("an egg", vec![Profile { y: (0..points).map(|i| -libm::cos(at(i))).collect(), r }], 12, 0.0, Caps::Both);
+        for _ in 0..2 {
+            assert!(
+                ball() == afresh(ball) && make(&egg) == afresh(|| make(&egg)),
+                "a sphere and an egg of {points} rings"
+            );
+        }
+    }
 }
 
 /// Parts of bodies that earlier poses moved alike.
@@ -229,19 +264,32 @@ fn bodies_in_other_poses() {
     };
     let rules = Rules::default();
     let first = bits(&body, &rest, &rules);
-    let changes: [(&str, fn(&mut JointPose)); 8] = [
+    let changes: [(&str, fn(&mut JointPose)); 11] = [
         ("x of the turn", |p| p.turn = turned(p.turn, DVec3::X * 0.01)),
         ("y of the turn", |p| p.turn = turned(p.turn, DVec3::Y * 0.01)),
         ("z of the turn", |p| p.turn = turned(p.turn, DVec3::Z * 0.01)),
+        ("x of the location", |p| p.location.x += 0.01),
+        ("z of the location", |p| p.location.z += 0.01),
+        ("the location, hardly", |p| p.location.y += 1e-7),
         ("the turn in the last bit", |p| p.turn = turned(p.turn, DVec3::X * 1e-17)),
         ("-0", |p| p.turn = turned(p.turn, DVec3::Z * -0.0)),
         ("the location", |p| p.location.y += 0.01),
         ("the scale", |p| p.scale.x += 0.01),
         ("the scale, hardly", |p| p.scale.x += f64::EPSILON),
     ];
+    // At rest a location moves one number of a transform.
+    let still = vec![JointPose::REST; rest.len()];
     for joint in (0..rest.len()).step_by(3) {
         for (what, change) in changes {
+            let mut pose = still.clone();
+            bits(&body, &pose, &rules);
+            change(&mut pose[joint]);
+            assert!(
+                bits(&body, &pose, &rules) == afresh(|| bits(&body, &pose, &rules)),
+                "{joint}, at rest: another {what}"
+            );
             let mut pose = rest.clone();
+            bits(&body, &pose, &rules);
             change(&mut pose[joint]);
             let here = bits(&body, &pose, &rules);
             assert!(here == afresh(|| bits(&body, &pose, &rules)), "joint {joint}: another {what}");

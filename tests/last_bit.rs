@@ -42,7 +42,7 @@ const WAYS: &[(&str, &str)] = &[
     ("a parameter of elements", "assume y ~ iid(normal(far(x), 9), 3); let o = y[1];"),
     ("a vector's mean", "assume y ~ mv_normal([far(x), 0], [[9, 1], [1, 9]]); let o = y[1];"),
     ("a distribution as a value", "let d = normal(far(x), 3); observe d = 1; let o = 1;"),
-    ("a bound of a choice", "assume y ~ uniform(far(x) - 1, 100); let o = y * 1;"),
+    ("a bound of a choice", "assume y ~ uniform(0.1 * far(x) - 200, 100); let o = y * 1;"),
     ("a factor", "factor(far(x) * 0.1); let o = 1;"),
 ];
 
