@@ -200,6 +200,11 @@ fn surfaces_of_other_numbers() {
         let r = y.iter().map(|y| 0.5 + (top - 0.5) * y).collect();
         Profile { y, r }
     };
+    let round = |points: usize, least: f64| {
+        let at = |i: usize| std::f64::consts::PI * i as f64 / (points - 1) as f64;
+        let r = (0..points).map(|i| if i % (points - 1) == 0 { least } else { libm::sin(at(i)).max(least) }).collect();
+        Profile { y: (0..points).map(|i| -libm::cos(at(i))).collect(), r }
+    };
     let above = |p: Profile, by: f64| Profile { y: p.y.iter().map(|y| y + by).collect(), ..p };
     let one = || vec![profile(6, 0.4)];
     type Asked = (&'static str, Vec<Profile>, u32, f64, Caps);
@@ -214,6 +219,10 @@ fn surfaces_of_other_numbers() {
         ("no cap", one(), 12, 0.0, Caps::None),
         ("two parts", vec![profile(6, 0.4), above(profile(6, 0.4), 1.0)], 12, 0.0, Caps::Both),
         ("two parts that meet", vec![profile(6, 0.5), above(profile(6, 0.5), 1.0)], 12, 0.0, Caps::Both),
+        ("two parts that meet at an angle", vec![profile(6, 0.5), above(profile(6, 2.0), 1.0)], 12, 0.0, Caps::Both),
+        ("two parts that bend", vec![profile(6, 0.5), above(profile(6, 0.2), 1.0)], 12, 0.0, Caps::Both),
+        ("a dome", vec![round(9, 0.0)], 12, 0.0, Caps::None),
+        ("a round tube", vec![round(9, 0.2)], 12, 0.0, Caps::None),
         ("parts of other numbers", vec![profile(5, 0.5), above(profile(7, 0.5), 1.0)], 12, 0.0, Caps::Both),
         ("radii", vec![profile(6, 0.3)], 12, 0.0, Caps::Both),
     ];
@@ -233,10 +242,7 @@ fn surfaces_of_other_numbers() {
     // Of as many rings, and another number of parts.
     let ball = || mesh_bits(&sphere(0.7, 12).unwrap());
     for points in 3..30 {
-        let at = |i: usize| std::f64::consts::PI * i as f64 / (points - 1) as f64;
-        let r = (0..points).map(|i| if i == 0 || i == points - 1 { 0.0 } else { libm::sin(at(i)) }).collect();
-        let egg =
-            ("an egg", vec![Profile { y: (0..points).map(|i| -libm::cos(at(i))).collect(), r }], 12, 0.0, Caps::Both);
+        let egg = ("an egg", vec![round(points, 0.0)], 12, 0.0, Caps::Both);
         for _ in 0..2 {
             assert!(
                 ball() == afresh(ball) && make(&egg) == afresh(|| make(&egg)),
