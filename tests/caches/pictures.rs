@@ -20,7 +20,8 @@ fn cameras(projection: Projection) -> Vec<(String, Camera)> {
         change(&mut other);
         all.push((what, other));
     };
-    let vectors: [(&str, fn(&mut Camera) -> &mut DVec3); 4] =
+    type Of = fn(&mut Camera) -> &mut DVec3;
+    let vectors: [(&str, Of); 4] =
         [("eye", |c| &mut c.eye), ("right", |c| &mut c.right), ("up", |c| &mut c.up), ("forward", |c| &mut c.forward)];
     for (name, of) in vectors {
         for axis in 0..3 {
@@ -125,7 +126,7 @@ fn pictures_of_another_kind_of_camera() {
 fn pictures_of_another_mesh_and_placement() {
     let camera = Camera::default_for(64, 64);
     let rest: Vec<Solid> = (0..5).map(|i| ball(0.5 * f64::from(i) - 1.0, 0.4)).collect();
-    let with = |one: &Solid| Solid::group(&[&rest[..], &[one.clone()]].concat());
+    let with = |one: &Solid| Solid::group(&[&rest[..], std::slice::from_ref(one)].concat());
     let check = |what: &str, solid: &Solid| {
         let here = contour_bits(&Contours::of(solid, &camera));
         assert!(here == afresh(|| contour_bits(&Contours::of(solid, &camera))), "{what}");
@@ -151,7 +152,7 @@ fn pictures_of_another_mesh_and_placement() {
     let fields: [fn(&mut Mesh); 4] = [
         |m| m.positions[40].x += 0.2,
         |m| m.normals.iter_mut().for_each(|n| *n = -*n),
-        |m| drop(Arc::make_mut(&mut m.topology).triangles.truncate(60)),
+        |m| Arc::make_mut(&mut m.topology).triangles.truncate(60),
         |m| Arc::make_mut(&mut m.topology).encloses ^= true,
     ];
     for (k, field) in fields.iter().enumerate() {

@@ -94,7 +94,8 @@ fn bodies_in_other_poses() {
     };
     let rules = Rules::default();
     let first = bits(&body, &rest, &rules);
-    let changes: [(&str, fn(&mut JointPose)); 11] = [
+    type Moved = (&'static str, fn(&mut JointPose));
+    let changes: [Moved; 11] = [
         ("x of the turn", |p| p.turn = turned(p.turn, DVec3::X * 0.01)),
         ("y of the turn", |p| p.turn = turned(p.turn, DVec3::Y * 0.01)),
         ("z of the turn", |p| p.turn = turned(p.turn, DVec3::Z * 0.01)),
