@@ -25,6 +25,11 @@ thread_local! {
     static KNOWN: RefCell<Vec<Known>> = const { RefCell::new(Vec::new()) };
 }
 
+/// What transforms are told by: equal numbers are not enough, 0 and -0 may make other zeros.
+fn bits(t: &Affine3A) -> [u32; 12] {
+    t.to_cols_array().map(f32::to_bits)
+}
+
 /// The mesh of each part under the transforms of all joints.
 pub(super) fn parts(body: &Arc<Armature>, transforms: &[Affine3A]) -> Vec<Instance> {
     KNOWN.with_borrow_mut(|known| {
@@ -41,7 +46,7 @@ pub(super) fn parts(body: &Arc<Armature>, transforms: &[Affine3A]) -> Vec<Instan
         parts
             .map(|((i, part), poses)| {
                 let own = || part.joints.iter().map(|j| &transforms[usize::from(*j)]);
-                match poses.iter().position(|(moved, _)| moved.iter().eq(own())) {
+                match poses.iter().position(|(moved, _)| moved.iter().map(bits).eq(own().map(bits))) {
                     Some(i) => poses[..=i].rotate_right(1),
                     None => {
                         poses.truncate(POSES - 1);

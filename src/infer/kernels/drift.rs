@@ -14,6 +14,7 @@ use crate::rng::Stream;
 use crate::trace::{Change, Target, Trace, TraceResult};
 use rustc_hash::FxHashMap;
 use serde::{Deserialize, Serialize};
+use std::collections::BTreeMap;
 
 /// The acceptance rates aimed at in one dimension and in many (Roberts & Rosenthal 2001).
 const ONE_D: f64 = 0.44;
@@ -144,13 +145,12 @@ impl Drift {
 
     fn adapt(&mut self, key: u64, accepted: bool, dimensions: usize) {
         let aim = if dimensions <= 1 { ONE_D } else { MANY_D };
-        if let Some(s) = self.scales.get_mut(&key) {
-            s.steps += 1.0;
-            // Not below a twentieth: an annealed warm-up moves the target all the time.
-            let gain = libm::pow(s.steps, -0.6).max(0.05);
-            s.log += gain * (f64::from(u8::from(accepted)) - aim) * 2.0;
-            s.log = s.log.clamp(-FARTHEST, FARTHEST);
-        }
+        let s = self.scales.entry(key).or_insert_with(|| Scale { log: libm::log(self.initial), steps: 0.0 });
+        s.steps += 1.0;
+        // Not below a twentieth: an annealed warm-up moves the target all the time.
+        let gain = libm::pow(s.steps, -0.6).max(0.05);
+        s.log += gain * (f64::from(u8::from(accepted)) - aim) * 2.0;
+        s.log = s.log.clamp(-FARTHEST, FARTHEST);
     }
 }
 
@@ -185,7 +185,7 @@ impl Kernel for Drift {
     }
 
     fn save(&self, _: &Trace) -> Vec<u8> {
-        pack(&(&self.scales, &self.spreads, &self.shapes))
+        pack(&(in_order(&self.scales), in_order(&self.spreads), in_order(&self.shapes)))
     }
 
     fn load(&mut self, state: &[u8]) -> Result<(), StateError> {
@@ -200,8 +200,7 @@ impl Kernel for Drift {
             return Ok(Outcome::default());
         }
         let key = self.key(trace, &targets);
-        let log_scale = libm::log(self.initial);
-        let scale = libm::exp(self.scales.entry(key).or_insert(Scale { log: log_scale, steps: 0.0 }).log);
+        let scale = libm::exp(self.scales.get(&key).map_or(libm::log(self.initial), |s| s.log));
         let joint = targets.len() > 1;
         let mut changes = Vec::with_capacity(targets.len());
         let mut moves = Vec::with_capacity(targets.len());
@@ -254,6 +253,11 @@ impl Kernel for Drift {
         }
         Ok(outcome)
     }
+}
+
+/// Entries by key, so that equal states are equal bytes.
+fn in_order<T>(map: &FxHashMap<u64, T>) -> BTreeMap<u64, &T> {
+    map.iter().map(|(key, value)| (*key, value)).collect()
 }
 
 /// What tells the shapes of different sets of choices apart.

@@ -165,7 +165,10 @@ impl Kernel for Slice {
     }
 
     fn save(&self, _: &Trace) -> Vec<u8> {
-        pack(&self.learnt.iter().collect::<Vec<_>>())
+        // In order: equal states are equal bytes.
+        let mut learnt: Vec<_> = self.learnt.iter().collect();
+        learnt.sort_unstable_by_key(|(key, _)| **key);
+        pack(&learnt)
     }
 
     fn load(&mut self, state: &[u8]) -> Result<(), StateError> {

@@ -375,6 +375,11 @@ impl Graph {
                     return Err(self.type_error(code, n, "not a `mem` function".into()));
                 };
                 let home = self.nodes[memo as usize].frame;
+                // What the key stands for: calls with 0 and -0 are one entry, and which of them came first must not show.
+                let values: Arc<[Value]> = match key {
+                    Key::List(keys) if values.len() != 1 => keys.iter().map(Key::to_value).collect(),
+                    key => [key.to_value()].into(),
+                };
                 let frame = Frame {
                     block,
                     parent,
@@ -384,7 +389,7 @@ impl Graph {
                     depth: self.frames[self.nodes[n as usize].frame as usize].depth + 1,
                     pass: 0,
                     key: Some(key.clone()),
-                    args: Arguments::Values(values.into()),
+                    args: Arguments::Values(values),
                     attached: true,
                 };
                 (self.make_frame(code, frame)?, 1)

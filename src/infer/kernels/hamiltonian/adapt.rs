@@ -6,6 +6,7 @@ use crate::infer::state::{StateError, holds};
 use crate::rng::Stream;
 use crate::trace::TraceResult;
 use serde::{Deserialize, Serialize};
+use std::collections::BTreeMap;
 
 /// Dual averaging's constants, as in Stan.
 const GAMMA: f64 = 0.05;
@@ -31,6 +32,9 @@ pub(super) struct Adaptation {
     /// What the metric belongs to: addresses and their numbers of coordinates.
     signature: Vec<(u64, usize)>,
     pub inverse_mass: Vec<f64>,
+    /// By address, what windows ended with: choices that go and come back have theirs again, so that after warm-up the metric is a
+    /// function of what choices there are.
+    learnt: BTreeMap<u64, Vec<f64>>,
     /// A step size that was given; else it is learnt.
     fixed: Option<f64>,
     step: f64,
@@ -52,6 +56,7 @@ impl Adaptation {
             target,
             signature: Vec::new(),
             inverse_mass: Vec::new(),
+            learnt: BTreeMap::new(),
             fixed,
             step: 0.0,
             averaged: 0.0,
@@ -83,14 +88,7 @@ impl Adaptation {
     pub fn step(&mut self, system: &mut System, here: &Point, adapting: bool, rng: &mut Stream) -> TraceResult<f64> {
         if system.signature() != self.signature {
             let signature = system.signature().to_vec();
-            // Other choices than before: what was learnt belongs to those that are still there.
-            let mut old = std::collections::BTreeMap::new();
-            let mut from = 0;
-            for (hash, n) in &self.signature {
-                old.insert(*hash, self.inverse_mass[from..from + n].to_vec());
-                from += n;
-            }
-            let known = |(hash, n): &(u64, usize)| old.get(hash).filter(|m| m.len() == *n).cloned();
+            let known = |(hash, n): &(u64, usize)| self.learnt.get(hash).filter(|m| m.len() == *n).cloned();
             self.inverse_mass = signature.iter().flat_map(|s| known(s).unwrap_or_else(|| vec![1.0; s.1])).collect();
             self.signature = signature;
             self.forget();
@@ -128,11 +126,7 @@ impl Adaptation {
             }
         }
         if self.seen == self.window_end {
-            // Towards a small variance, as Stan does, for few states.
-            let n = self.count;
-            for (m, s) in self.inverse_mass.iter_mut().zip(&self.square) {
-                *m = (n / (n + 5.0)) * (s / (n - 1.0)) + 1e-3 * 5.0 / (n + 5.0);
-            }
+            self.close();
             self.forget();
             self.window = self.window.saturating_mul(2);
             self.window_end = self.seen.saturating_add(self.window);
@@ -140,6 +134,24 @@ impl Adaptation {
             self.mean_log = libm::log(10.0 * self.averaged);
             (self.bias, self.rounds) = (0.0, 0.0);
             self.step = self.averaged;
+        }
+    }
+
+    /// Ends a window with the variances of its states, drawn towards a small one, as Stan does, for few of them.
+    fn close(&mut self) {
+        let n = self.count;
+        // The window began anew with the choices there are: one state has no variance.
+        if n < 2.0 {
+            return;
+        }
+        for (m, s) in self.inverse_mass.iter_mut().zip(&self.square) {
+            *m = (n / (n + 5.0)) * (s / (n - 1.0)) + 1e-3 * 5.0 / (n + 5.0);
+        }
+        let mut rest = &self.inverse_mass[..];
+        for (hash, n) in &self.signature {
+            let (own, others) = rest.split_at((*n).min(rest.len()));
+            self.learnt.insert(*hash, own.to_vec());
+            rest = others;
         }
     }
 

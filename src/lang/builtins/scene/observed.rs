@@ -9,7 +9,10 @@ use crate::vision::{
 use std::any::Any;
 use std::sync::{Arc, Mutex, OnceLock, PoisonError};
 
-/// Prepared things by what they were prepared for; few are ever asked for.
+/// The most prepared things of a kind that are kept: options may be choices, such as the `sigma` of a chamfer distance.
+const MOST: usize = 32;
+
+/// Prepared things by what they were prepared for.
 #[derive(Debug)]
 pub(super) struct Prepared<K, T>(Mutex<Vec<(K, Arc<T>)>>);
 
@@ -27,6 +30,10 @@ impl<K: PartialEq, T> Prepared<K, T> {
             return Ok(Arc::clone(t));
         }
         let made = Arc::new(make(&key)?);
+        if all.len() == MOST {
+            // The first one may not be as it would be made again: what a likelihood draws is put there.
+            all.remove(1);
+        }
         all.push((key, Arc::clone(&made)));
         Ok(made)
     }
@@ -213,5 +220,22 @@ impl Object for KeypointsValue {
     /// The x and y of each joint.
     fn numbers(&self) -> Option<Vec<f64>> {
         Some(self.0.points().iter().flat_map(|p| [p.x, p.y]).collect())
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    #[test]
+    fn options_that_move_do_not_fill_the_memory() {
+        let prepared: Prepared<u32, u32> = Prepared::default();
+        prepared.get(0, |_| Ok(7)).unwrap();
+        let first = Arc::downgrade(&prepared.get(1, |_| Ok(2)).unwrap());
+        for key in 0..1000 {
+            assert_eq!(*prepared.get(key, |k| Ok(k + 1)).unwrap(), if key == 0 { 7 } else { key + 1 });
+        }
+        assert_eq!(prepared.0.lock().unwrap().len(), MOST);
+        assert!(first.upgrade().is_none() && *prepared.get(0, |_| Ok(8)).unwrap() == 7);
     }
 }

@@ -1,0 +1,185 @@
+//! Pictures: layers, backdrops, views, coarser meshes.
+
+use super::{afresh, contour_bits, frame_bits};
+use glam::DVec3;
+use pcadlang::geom::{Affine, Caps, Mesh, Profile, Solid, sphere};
+use pcadlang::render::{Camera, Channels, Contours, Frame, Projection, View};
+use std::sync::Arc;
+
+fn ball(at: f64, radius: f64) -> Solid {
+    let mesh = Arc::new(sphere(radius, 12).unwrap());
+    Solid::new(mesh).placed(Affine::new(DVec3::new(at, 0.3 * at, 0.2 * at), DVec3::ZERO, DVec3::ONE))
+}
+
+/// Cameras that differ from the first in one field each, and what that is.
+fn cameras(projection: Projection) -> Vec<(String, Camera)> {
+    let base = Camera { projection, ..Camera::default_for(72, 56) };
+    let mut all = vec![("nothing".to_owned(), base)];
+    let mut add = |what: String, change: &dyn Fn(&mut Camera)| {
+        let mut other = base;
+        change(&mut other);
+        all.push((what, other));
+    };
+    type Of = fn(&mut Camera) -> &mut DVec3;
+    let vectors: [(&str, Of); 4] =
+        [("eye", |c| &mut c.eye), ("right", |c| &mut c.right), ("up", |c| &mut c.up), ("forward", |c| &mut c.forward)];
+    for (name, of) in vectors {
+        for axis in 0..3 {
+            add(format!("{name}[{axis}]"), &|c| of(c)[axis] += 0.03);
+        }
+    }
+    add("width".into(), &|c| c.width += 1);
+    add("height".into(), &|c| c.height -= 20);
+    for k in 0..3 {
+        add(format!("number {k} of the projection"), &|c| {
+            c.projection = match c.projection {
+                Projection::Pinhole { mut focal_px, mut cx, mut cy } => {
+                    *[&mut focal_px, &mut cx, &mut cy][k] += 1.3;
+                    Projection::Pinhole { focal_px, cx, cy }
+                }
+                Projection::Orthographic { mut units_per_pixel, mut cx, mut cy } => {
+                    *[&mut units_per_pixel, &mut cx, &mut cy][k] *= 1.05;
+                    Projection::Orthographic { units_per_pixel, cx, cy }
+                }
+            };
+        });
+    }
+    add("kind of the projection".into(), &|c| {
+        c.projection = match c.projection {
+            Projection::Pinhole { focal_px, cx, cy } => {
+                Projection::Orthographic { units_per_pixel: focal_px.recip(), cx, cy }
+            }
+            Projection::Orthographic { units_per_pixel, cx, cy } => {
+                Projection::Pinhole { focal_px: units_per_pixel.recip(), cx, cy }
+            }
+        };
+    });
+    all
+}
+
+/// Contours drawn at once, of layers, and before a backdrop, through views with frames and without.
+#[test]
+fn pictures_of_another_camera() {
+    let members: Vec<Solid> = (0..8).map(|i| ball(0.4 * f64::from(i) - 1.4, 0.5)).collect();
+    let still = Solid::group(&members);
+    // One that moves before others that stand still, which makes a backdrop.
+    let moved = Solid::group(&[&members[..3], &[ball(-0.1, 0.8)], &members[4..]].concat());
+    let solids = [("at once", &members[0], &members[1]), ("of parts", &still, &moved)];
+    let (cx, cy) = (36.0, 28.0);
+    let projections =
+        [Projection::Pinhole { focal_px: 130.0, cx, cy }, Projection::Orthographic { units_per_pixel: 0.06, cx, cy }];
+    for ((how, a, b), projection) in solids.iter().flat_map(|s| projections.map(|p| (s, p))) {
+        let cameras = cameras(projection);
+        let base = cameras[0].1;
+        for (what, camera) in &cameras {
+            let seen = |eye: &Camera| {
+                (contour_bits(&Contours::of(a, eye)), frame_bits(&Frame::render(a, eye, Channels::Depth)))
+            };
+            let differs = seen(camera) != seen(&base);
+            assert!(differs == (what != "nothing"), "{how}, {what}: the picture shows nothing of it");
+            for (solid, eye) in [(a, &base), (b, &base), (a, &base), (a, camera), (b, camera), (a, camera), (a, &base)]
+            {
+                let here = contour_bits(&Contours::of(solid, eye));
+                let there = afresh(|| contour_bits(&Contours::of(solid, eye)));
+                assert!(here == there, "{how}: contours with another {what} of the camera");
+                let here = frame_bits(&Frame::render(solid, eye, Channels::All));
+                let there = afresh(|| frame_bits(&Frame::render(solid, eye, Channels::All)));
+                assert!(here == there, "{how}: frames with another {what} of the camera");
+                let view = || View::new((*solid).clone(), *eye);
+                let change = |v: &View| {
+                    let change = v.change(72);
+                    change.as_ref().as_ref().map(|c| (contour_bits(&c.moving), c.count))
+                };
+                let (view, other) = (view(), view());
+                let counted = change(&view).map_or(view.contours(72).len(), |c| c.1);
+                assert_eq!(counted, afresh(|| other.contours(72).len()), "{how}: what changed with another {what}");
+            }
+        }
+    }
+}
+
+/// The kind of projection alone: a scene so large that one number is good as focal length and as size of a pixel.
+#[test]
+fn pictures_of_another_kind_of_camera() {
+    let by = Affine::new(DVec3::ZERO, DVec3::ZERO, DVec3::splat(800.0));
+    let members: Vec<Solid> = (0..6).map(|i| ball(0.4 * f64::from(i) - 1.0, 0.5).placed(by)).collect();
+    let moved = Solid::group(&[&members[..5], &[ball(1.1, 0.3).placed(by)]].concat());
+    let still = Solid::group(&members);
+    let (scale, cx, cy) = (80.0, 36.0, 28.0);
+    let kinds =
+        [Projection::Pinhole { focal_px: scale, cx, cy }, Projection::Orthographic { units_per_pixel: scale, cx, cy }];
+    let mut seen = Vec::new();
+    for i in 0..8 {
+        let base = Camera { projection: kinds[i % 2], ..Camera::default_for(72, 56) };
+        let camera = Camera { eye: DVec3::new(0.0, 0.0, 6400.0), ..base };
+        for solid in [&still, &moved, &still] {
+            let here = contour_bits(&Contours::of(solid, &camera));
+            assert!(here == afresh(|| contour_bits(&Contours::of(solid, &camera))), "another kind of projection");
+            seen.push(here);
+        }
+    }
+    assert!(seen[0] != seen[3] && seen[0] != seen[1] && seen[0].len() > 100);
+}
+
+/// Another mesh at the same place, in the memory of one that is gone; another placement by one number.
+#[test]
+fn pictures_of_another_mesh_and_placement() {
+    let camera = Camera::default_for(64, 64);
+    let rest: Vec<Solid> = (0..5).map(|i| ball(0.5 * f64::from(i) - 1.0, 0.4)).collect();
+    let with = |one: &Solid| Solid::group(&[&rest[..], std::slice::from_ref(one)].concat());
+    let check = |what: &str, solid: &Solid| {
+        let here = contour_bits(&Contours::of(solid, &camera));
+        assert!(here == afresh(|| contour_bits(&Contours::of(solid, &camera))), "{what}");
+        here
+    };
+    let mut seen = Vec::new();
+    for i in 0..40 {
+        seen.push(check("another mesh", &with(&ball(0.1, 0.6 + 0.01 * f64::from(i % 20)))));
+    }
+    assert!((1..20).all(|i| seen[i] != seen[i - 1] && seen[i] == seen[i + 20]));
+    let mesh = Arc::new(sphere(0.7, 16).unwrap());
+    let base = Affine::new(DVec3::new(0.1, 0.2, 0.3), DVec3::new(0.1, 0.2, 0.3), DVec3::ONE);
+    let placed = |by: Affine| with(&Solid::new(mesh.clone()).placed(by));
+    let first = check("a placement", &placed(base));
+    for k in 0..12 {
+        let mut numbers = base.0.to_cols_array();
+        numbers[k] += 0.05;
+        let other = check("another placement", &placed(Affine(glam::DAffine3::from_cols_array(&numbers))));
+        assert!(other != first, "number {k} of a placement is not seen");
+        assert!(check("the placement again", &placed(base)) == first);
+    }
+    // One field of the mesh itself.
+    let fields: [fn(&mut Mesh); 4] = [
+        |m| m.positions[40].x += 0.2,
+        |m| m.normals.iter_mut().for_each(|n| *n = -*n),
+        |m| Arc::make_mut(&mut m.topology).triangles.truncate(60),
+        |m| Arc::make_mut(&mut m.topology).encloses ^= true,
+    ];
+    for (k, field) in fields.iter().enumerate() {
+        let mut other = Mesh::clone(&mesh);
+        field(&mut other);
+        check(&format!("a mesh with another field {k}"), &with(&Solid::new(Arc::new(other)).placed(base)));
+        assert!(check("the mesh again", &placed(base)) == first);
+    }
+}
+
+/// Coarser versions of a mesh, by how far they may be off, at any size and from anywhere.
+#[test]
+fn meshes_at_other_details() {
+    let part = Profile { y: vec![-1.0, -0.6, -0.1, 0.4, 0.9], r: vec![0.3, 0.6, 0.65, 0.5, 0.2] };
+    let make = || Solid::lathe(std::slice::from_ref(&part), 48, 0.0, Caps::Both).unwrap();
+    let shared = make();
+    let near = Camera { eye: DVec3::new(0.0, 0.0, 5.0), ..Camera::default_for(200, 200) };
+    for detail in [0.0, 0.2, 1.0, 4.0, 0.5, 0.2, 0.0] {
+        for size in [32, 200, 64] {
+            for camera in [Camera::default_for(200, 200), near] {
+                let see = |solid: Solid| {
+                    let view = View::with_detail(solid, camera, detail);
+                    (contour_bits(&view.contours(size)), frame_bits(&view.depth(size)), view.triangles(size))
+                };
+                let here = see(shared.clone());
+                assert!(here == afresh(|| see(make())), "detail {detail} at {size} pixels");
+            }
+        }
+    }
+}

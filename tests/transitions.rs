@@ -1,0 +1,243 @@
+//! One transition from an exact draw: the end is distributed as the start, and pairs (start, end) are as frequent as (end, start).
+//! Exact tests with fixed seeds, of what only long chains would show otherwise: the acceptance of doubling in `slice`, the choice
+//! of a place within trajectories of `nuts`, the metric of Hamiltonian kernels. A right kernel fails one with a chance of 1e-6.
+
+use ciborium::Value as Cbor;
+use pcadlang::Model;
+use pcadlang::infer::{At, Hmc, Kernel, Nuts, Pick, Scope, Slice};
+use pcadlang::lang::value::Value;
+use pcadlang::trace::{Draws, Selector, Trace};
+use statrs::distribution::{ChiSquared, ContinuousCDF, Normal};
+
+/// The chance that a test of a right kernel fails.
+const ALPHA: f64 = 1e-6;
+
+/// Uniform numbers in 0..1, the same in every run.
+struct Uniform(u64);
+
+impl Uniform {
+    fn next(&mut self) -> f64 {
+        self.0 = self.0.wrapping_mul(6364136223846793005).wrapping_add(1442695040888963407);
+        let mut x = self.0;
+        x = (x ^ (x >> 33)).wrapping_mul(0xff51afd7ed558ccd);
+        ((x ^ (x >> 33)) >> 11) as f64 / (1u64 << 53) as f64 + 1e-17
+    }
+
+    fn normal(&mut self) -> f64 {
+        standard().inverse_cdf(self.next().clamp(1e-16, 1.0 - 1e-16))
+    }
+}
+
+fn standard() -> Normal {
+    Normal::new(0.0, 1.0).unwrap()
+}
+
+fn all() -> Scope {
+    Scope { selector: Selector::All, pick: Pick::All }
+}
+
+fn trace(text: &str) -> Trace {
+    Model::from_text(text).and_then(|m| m.simulate(1, 0)).unwrap_or_else(|e| panic!("{e}"))
+}
+
+fn put(trace: &mut Trace, values: &[(&str, Value)]) {
+    for (address, v) in values {
+        trace.set(address, v.clone(), Draws::default()).unwrap_or_else(|e| panic!("{e}"));
+    }
+}
+
+/// The p-value of counts in cells that are as likely.
+fn even(counts: &[u64]) -> f64 {
+    let expected = counts.iter().sum::<u64>() as f64 / counts.len() as f64;
+    let chi2: f64 = counts.iter().map(|c| (*c as f64 - expected).powi(2) / expected).sum();
+    1.0 - ChiSquared::new(counts.len() as f64 - 1.0).unwrap().cdf(chi2)
+}
+
+/// Of so many moves there and back, the p-value of as many that go there.
+fn balanced(there: u64, back: u64) -> f64 {
+    let z = (there as f64 - back as f64) / ((there + back) as f64).sqrt();
+    2.0 * standard().cdf(-z.abs())
+}
+
+/// Says what was found, and fails where a right kernel would not.
+fn holds(what: &str, p: f64) {
+    println!("{what}: p = {p:.2e}");
+    assert!(p >= ALPHA, "{what}: p = {p:.2e}");
+}
+
+/// A density of one number: draws, and where a number lies among them.
+struct Density<'a> {
+    text: &'a str,
+    draw: fn(&mut Uniform) -> f64,
+    cdf: fn(f64) -> f64,
+    /// Between the modes.
+    middle: f64,
+}
+
+/// A narrow mode, and a wide one that has more.
+fn modes_cdf(x: f64) -> f64 {
+    0.3 * standard().cdf((x + 3.0) / 0.1) + 0.7 * standard().cdf(x - 1.5)
+}
+
+/// By segment: where it ends, and what the density of normal(0, 2) is multiplied with.
+const STEPS: [(f64, f64); 3] = [(-1.0, 8.0), (1.0, 0.02), (f64::INFINITY, 1.0)];
+
+/// The mass of the segments as far as x.
+fn steps_mass(x: f64) -> f64 {
+    let normal = |x: f64| standard().cdf(x / 2.0);
+    let mut from = f64::NEG_INFINITY;
+    STEPS
+        .map(|(to, weight)| weight * (normal(x.min(to)) - normal(x.min(std::mem::replace(&mut from, to)))))
+        .iter()
+        .sum()
+}
+
+const DENSITIES: [Density; 2] = [
+    Density {
+        text: "assume x ~ mixture([0.3, 0.7], [normal(-3, 0.1), normal(1.5, 1)]); observe normal(0 * x, 1) = 0;",
+        draw: |u| if u.next() < 0.3 { 0.1 * u.normal() - 3.0 } else { u.normal() + 1.5 },
+        cdf: modes_cdf,
+        middle: -2.0,
+    },
+    Density {
+        text: "assume x ~ normal(0, 2); factor(log(if x < -1 { 8 } else { if x < 1 { 0.02 } else { 1 } }));",
+        draw: |u| loop {
+            let x = 2.0 * u.normal();
+            let weight = STEPS.iter().find(|(to, _)| x < *to).map_or(0.0, |s| s.1);
+            if 8.0 * u.next() < weight {
+                return x;
+            }
+        },
+        cdf: |x| steps_mass(x) / steps_mass(f64::INFINITY),
+        middle: 0.0,
+    },
+];
+
+/// Slice sampling, doubling or stepping out, over two modes of different widths and over steps.
+#[test]
+fn slices_of_two_modes() {
+    for (d, doubling, width) in [(0, true, 0.3), (0, true, 3.0), (0, false, 1.5), (1, true, 0.3), (1, false, 0.5)] {
+        let d = &DENSITIES[d];
+        let (mut trace, mut rng) = (trace(d.text), Uniform(7));
+        let mut kernel = Slice::new(all(), Some(width), doubling);
+        let (mut bins, mut there, mut back) = ([0; 12], 0, 0);
+        for i in 0..12_000 {
+            let from = (d.draw)(&mut rng);
+            put(&mut trace, &[("@x", from.into())]);
+            kernel.step(&mut trace, &At::new(3, 0, i)).unwrap();
+            let Ok(Value::Num(to)) = trace.get("@x") else { panic!("no number") };
+            there += u64::from(from < d.middle && to > d.middle);
+            back += u64::from(from > d.middle && to < d.middle);
+            bins[(((d.cdf)(to) * 12.0) as usize).min(11)] += 1;
+        }
+        let what = format!("slice(width = {width}, doubling = {doubling}) on {}", d.text);
+        assert!(there + back > 100 || !doubling, "{what}: {there} moves between the modes");
+        if doubling {
+            holds(&format!("{what}: there and back"), balanced(there, back));
+        }
+        holds(&format!("{what}: ends"), even(&bins));
+    }
+}
+
+/// Numbers of one scale and one of another, so that trajectories are long and their energy goes up and down.
+const GAUSSIAN: &str =
+    "assume a ~ iid(normal(0, 1), 5); assume b ~ normal(0, 8); observe normal(0 * (sum(a) + b), 1) = 0;";
+
+/// A kernel with a step size and inverse masses put in the place of what it would learn: those of `a`, that of `b`.
+fn set<K: Kernel>(mut kernel: K, trace: &mut Trace, step: f64, masses: ([f64; 5], f64)) -> K {
+    put(trace, &[("@a", Value::array(vec![0.1; 5])), ("@b", 0.2.into())]);
+    kernel.step(trace, &At::new(1, 0, 0)).unwrap();
+    let mut state: Cbor = ciborium::from_reader(&kernel.save(trace)[..]).unwrap();
+    let adaptation = state.as_array_mut().unwrap()[0].as_map_mut().unwrap();
+    let sizes =
+        adaptation.iter().find(|(k, _)| k.as_text() == Some("signature")).unwrap().1.as_array().unwrap().clone();
+    // By address: `b` is one, the elements of `a` are the others, in order.
+    let b = trace.address_hash(trace.find(&"@b".parse().unwrap()).unwrap());
+    let (mut rest, is_b) = (masses.0.into_iter(), |s: &Cbor| s.as_array().unwrap()[0] == Cbor::from(b));
+    let masses: Vec<Cbor> = sizes
+        .iter()
+        .flat_map(|s| {
+            if is_b(s) { vec![masses.1] } else { rest.by_ref().take(if sizes.len() == 2 { 5 } else { 1 }).collect() }
+        })
+        .map(Cbor::Float)
+        .collect();
+    assert!(masses.len() == 6);
+    for (name, value) in adaptation {
+        match name.as_text() {
+            Some("inverse_mass") => *value = Cbor::Array(masses.clone()),
+            Some("step" | "averaged") => *value = Cbor::Float(step),
+            _ => {}
+        }
+    }
+    let mut bytes = Vec::new();
+    ciborium::into_writer(&state, &mut bytes).unwrap();
+    kernel.load(&bytes).unwrap();
+    kernel
+}
+
+/// From draws of the Gaussian, so many transitions: the places of all of `a`, of `b`, of the length of `a` among their distributions.
+fn gaussian_stays(what: &str, mut kernel: impl Kernel, trace: &mut Trace, count: u64) {
+    let mut rng = Uniform(11);
+    let (mut bins, mut accepted) = ([[0; 16]; 3], 0);
+    let length = ChiSquared::new(5.0).unwrap();
+    for i in 0..count {
+        let a: Vec<f64> = (0..5).map(|_| rng.normal()).collect();
+        put(trace, &[("@a", Value::array(a)), ("@b", (8.0 * rng.normal()).into())]);
+        accepted += kernel.step(trace, &At::new(5, 0, i)).unwrap().accepted;
+        let (Ok(Value::Array(a)), Ok(Value::Num(b))) = (trace.get("@a"), trace.get("@b")) else { panic!("no numbers") };
+        let mut count = |list: usize, place: f64| bins[list][((place * 16.0) as usize).min(15)] += 1;
+        a.iter().for_each(|z| count(0, standard().cdf(*z)));
+        count(1, standard().cdf(b / 8.0));
+        count(2, length.cdf(a.iter().map(|z| z * z).sum()));
+    }
+    let share = f64::from(accepted) / count as f64;
+    assert!((0.2..1.0 + 1e-9).contains(&share), "{what}: {share} accepted");
+    for (bins, of) in bins.iter().zip(["a", "b", "the length of a"]) {
+        holds(&format!("{what}, {of}"), even(bins));
+    }
+}
+
+/// A step so long that the weights of places along a trajectory differ much: the choice among them shows.
+#[test]
+fn places_of_a_trajectory_are_chosen_by_their_weights() {
+    let mut t = trace(GAUSSIAN);
+    for step in [1.6, 1.8] {
+        let kernel = set(Nuts::new(all(), 8), &mut t, step, ([1.0; 5], 1.0));
+        gaussian_stays(&format!("nuts, step {step}"), kernel, &mut t, 8000);
+    }
+}
+
+/// Inverse masses far from 1 and from each other, which leave the density as it is, whatever they are.
+#[test]
+fn metrics_leave_the_density_as_it_is() {
+    let mut t = trace(GAUSSIAN);
+    let masses = ([6.0, 0.2, 1.0, 3.0, 0.5], 40.0);
+    let kernel = set(Hmc::new(all(), 3, None), &mut t, 0.5, masses);
+    gaussian_stays("hmc, uneven metric", kernel, &mut t, 4000);
+    let kernel = set(Hmc::new(all(), 1, None), &mut t, 0.5, masses);
+    gaussian_stays("mala, uneven metric", kernel, &mut t, 4000);
+    let kernel = set(Nuts::new(all(), 6), &mut t, 0.5, masses);
+    gaussian_stays("nuts, uneven metric", kernel, &mut t, 2000);
+}
+
+/// What warm-up learns is the variance of each number, not its inverse and not its root.
+#[test]
+fn metrics_learn_variances() {
+    let text = "assume x ~ normal(0, 0.05); assume y ~ normal(0, 0.3); assume z ~ normal(0, 1.5);
+                observe normal(0 * (x + y + z), 1) = 0;";
+    for mut kernel in [Box::new(Nuts::new(all(), 8)) as Box<dyn Kernel>, Box::new(Hmc::new(all(), 10, None))] {
+        let mut t = trace(text);
+        for i in 0..1000 {
+            kernel.step(&mut t, &At { adapting: true, ..At::new(2, 0, i) }).unwrap();
+        }
+        let state: Cbor = ciborium::from_reader(&kernel.save(&t)[..]).unwrap();
+        let adaptation = state.as_array().unwrap()[0].as_map().unwrap().clone();
+        let learnt = &adaptation.iter().find(|(k, _)| k.as_text() == Some("inverse_mass")).unwrap().1;
+        let mut learnt: Vec<f64> = learnt.as_array().unwrap().iter().map(|x| x.as_float().unwrap()).collect();
+        // Whatever order choices are in.
+        learnt.sort_by(f64::total_cmp);
+        for (found, variance) in learnt.iter().zip([0.0025, 0.09, 2.25]) {
+            assert!((0.3..3.0).contains(&(found / variance)), "{}: {learnt:?}", kernel.name());
+        }
+    }
+}
