@@ -64,6 +64,15 @@ pub(super) const TABLE: &[Row] = &[
             })
         },
     ),
+    other(
+        "truncated",
+        &[
+            arg("d", Type::Dist, "A distribution of numbers."),
+            opt("lo", Type::Nums, "-inf", "The lower bound."),
+            opt("hi", Type::Nums, "inf", "The upper bound, above `lo`; of integers it may be `lo`."),
+        ],
+        truncated,
+    ),
     scalar!("inv_gamma", [shape, scale], dist::InvGamma::new(shape, scale).map(Dist::InvGamma)),
     scalar!("cauchy", [location, scale], dist::Cauchy::new(location, scale).map(Dist::Cauchy)),
     scalar!("laplace", [location, scale], dist::Laplace::new(location, scale).map(Dist::Laplace)),
@@ -78,7 +87,14 @@ pub(super) const TABLE: &[Row] = &[
     scalar!("weibull", [shape, scale], dist::Weibull::new(shape, scale).map(Dist::Weibull)),
     scalar!("neg_binomial", [r, p], dist::NegBinomial::new(r, p).map(Dist::NegBinomial)),
     scalar!("geometric", [p], dist::Geometric::new(p).map(Dist::Geometric)),
-    other("flat", &[], |_| Ok(Dist::Flat(dist::Flat))),
+    other(
+        "flat",
+        &[
+            opt("lo", Type::Nums, "-inf", "The lower bound."),
+            opt("hi", Type::Nums, "inf", "The upper bound; at most one of them is finite."),
+        ],
+        |a| elementwise(a, &UNBOUNDED, |[lo, hi]| dist::Flat::new(lo, hi).map(Dist::Flat)),
+    ),
     scalar!("flip", [p], dist::Flip::new(p).map(Dist::Flip)),
     scalar!("uniform_discrete", [lo, hi], dist::UniformDiscrete::new(lo, hi).map(Dist::UniformDiscrete)),
     scalar!("binomial", [n, p], dist::Binomial::new(n, p).map(Dist::Binomial)),
@@ -149,6 +165,8 @@ pub(super) const TABLE: &[Row] = &[
             arg("cov", Type::Covariance, "The covariance function, such as `sq_exp(length)`."),
             arg("at", Type::Array, "The points."),
             opt("centred", Type::Bool, "false", "Stores the values, instead of the white noise that makes them."),
+            opt("jitter", Type::Num, "1e-6", "What is added to the diagonal of the covariance matrix.")
+                .unit("shares of the variance"),
         ],
         gp,
     ),
@@ -158,11 +176,11 @@ pub(super) const TABLE: &[Row] = &[
     }),
     other(
         "ordered",
-        &[arg("d", Type::Dist, "A distribution of continuous numbers."), arg("n", Type::Int, "How many.")],
-        |a| {
-            let Value::Dist(d) = a.get(0) else { return Err(a.wrong(0, "a distribution")) };
-            dist::Ordered::new(Dist::clone(d), a.count(1)?).map(|d| Dist::Ordered(Arc::new(d))).map_err(fault)
-        },
+        &[
+            arg("d", Type::Any, "A distribution of continuous numbers, or an array of them."),
+            opt("n", Type::Int, "as many as there are in `d`", "How many of one distribution."),
+        ],
+        ordered,
     ),
     other(
         "mixture",
@@ -174,6 +192,9 @@ pub(super) const TABLE: &[Row] = &[
     ),
 ];
 
+/// The bounds of all numbers.
+const UNBOUNDED: [f64; 2] = [f64::NEG_INFINITY, f64::INFINITY];
+
 /// What the reference says of a family besides its arguments.
 pub(super) fn notes(name: &str) -> Vec<(&'static str, String)> {
     let found = FAMILIES.iter().find(|f| f.name == name);
@@ -182,10 +203,11 @@ pub(super) fn notes(name: &str) -> Vec<(&'static str, String)> {
 
 fn fault(e: ParamError) -> Fault {
     let fault = Fault::domain(e.to_string());
-    match e.rule.starts_with("must be positive") {
-        true => fault
+    match e.rule {
+        rule if rule.starts_with("must be positive") => fault
             .with_hint("what must be positive is drawn from half_normal, gamma or lognormal, or is exp of a number"),
-        false => fault,
+        "must make a positive definite matrix" => fault.with_hint("a larger `jitter` makes it so, or `+ white(sd)`"),
+        _ => fault,
     }
 }
 
@@ -266,13 +288,63 @@ fn wishart(a: &Args) -> Result<Dist, Fault> {
     dist::Wishart::new(a.num(0)?, &scale).map(|d| Dist::Wishart(Arc::new(d))).map_err(fault)
 }
 
-fn mixture(a: &Args) -> Result<Dist, Fault> {
-    let components = a.elements(1)?;
+/// An array of distributions.
+fn distributions(a: &Args, i: usize) -> Result<Vec<Dist>, Fault> {
     let component = |v: &Value| match v {
         Value::Dist(d) => Ok(Dist::clone(d)),
-        other => Err(a.element_wrong(1, "an array of distributions", other)),
+        other => Err(a.element_wrong(i, "an array of distributions", other)),
     };
-    let components = components.iter().map(component).collect::<Result<Vec<_>, _>>()?;
+    a.elements(i)?.iter().map(component).collect()
+}
+
+fn ordered(a: &Args) -> Result<Dist, Fault> {
+    let made = match a.get(0) {
+        Value::Dist(d) if a.given(1) => dist::Ordered::new(Dist::clone(d), a.count(1)?),
+        Value::Dist(_) => {
+            let hint = "ordered(normal(0, 1), 3) is three numbers; unlike priors are listed: ordered([d1, d2])";
+            return Err(Fault::type_error("ordered: `n` says how many numbers of one distribution").with_hint(hint));
+        }
+        _ if a.given(1) => {
+            let hint = "leave `n` out: there is one number for each distribution of the array";
+            return Err(a.wrong(0, "one distribution where `n` is given").with_hint(hint));
+        }
+        Value::List(_) | Value::Array(_) => dist::Ordered::of(distributions(a, 0)?),
+        _ => return Err(a.wrong(0, "a distribution or an array of distributions")),
+    };
+    made.map(|d| Dist::Ordered(Arc::new(d))).map_err(fault)
+}
+
+/// Element by element where a bound is an array.
+fn truncated(a: &Args) -> Result<Dist, Fault> {
+    let Value::Dist(d) = a.get(0) else { return Err(a.wrong(0, "a distribution")) };
+    let mut columns: [Option<Arc<[f64]>>; 2] = [None, None];
+    let mut bounds = UNBOUNDED;
+    for i in 0..2 {
+        match a.get(i + 1) {
+            Value::Unit => {}
+            Value::Num(x) => bounds[i] = *x,
+            v if array_len(v).is_some() => columns[i] = Some(a.array(i + 1)?),
+            _ => return Err(a.wrong(i + 1, "a number or an array of numbers")),
+        }
+    }
+    let Some(n) = columns.iter().flatten().map(|xs| xs.len()).next() else {
+        return dist::truncated(d, bounds[0], bounds[1]).map_err(fault);
+    };
+    let expected = d.elements().unwrap_or(n);
+    if let Some(i) = columns.iter().position(|c| c.as_ref().is_some_and(|xs| xs.len() != expected)) {
+        return Err(a.wrong_length(i + 1, &format!("as many elements as the rest, {expected}")));
+    }
+    let mut elements = Vec::with_capacity(n);
+    for k in 0..n {
+        let [lo, hi] = [0, 1].map(|i| columns[i].as_ref().map_or(bounds[i], |xs| xs[k]));
+        let made = dist::truncated(&d.element(k), lo, hi);
+        elements.push(made.map_err(|e| Fault::domain(format!("{e} (element {k})")))?);
+    }
+    dist::Product::new(elements).map(|d| Dist::Product(Arc::new(d))).map_err(fault)
+}
+
+fn mixture(a: &Args) -> Result<Dist, Fault> {
+    let components = distributions(a, 1)?;
     dist::Mixture::new(&a.array(0)?, components).map(|d| Dist::Mixture(Arc::new(d))).map_err(fault)
 }
 
@@ -299,7 +371,8 @@ fn gp(a: &Args) -> Result<Dist, Fault> {
         return Err(a.wrong_length(0, &format!("as many elements as there are points, {}", at.len())));
     }
     let centred = a.bool_or(3, false)?;
-    dist::Gp::new(mean, cov, &at, centred).map(|d| Dist::Gp(Arc::new(d))).map_err(fault)
+    let jitter = a.num_or(4, dist::JITTER)?;
+    dist::Gp::with_jitter(mean, cov, &at, centred, jitter).map(|d| Dist::Gp(Arc::new(d))).map_err(fault)
 }
 
 /// The family of a name, found while compiling.

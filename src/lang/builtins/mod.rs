@@ -6,6 +6,7 @@
 mod args;
 mod covariance;
 pub mod data;
+mod definite;
 mod derivative;
 mod distributions;
 pub mod doc;
@@ -15,7 +16,9 @@ mod foreign;
 mod forms;
 mod inference;
 mod interp;
+mod known_as;
 mod list;
+mod log_density;
 mod math;
 mod matrix;
 mod operators;

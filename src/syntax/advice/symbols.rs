@@ -44,7 +44,10 @@ impl Rules<'_, '_> {
                 format!("write `let {name} = …;` for a value, `{name} ~ …;` for a random choice; values do not change"),
             ),
             Token::Name(_) if self.expects("~") => {
-                say("values do not change", "", "`x[k] ~ d;` makes a random choice; an array is made by `map(f, xs)`")
+                let next = format!("`{name}[t] = f({name}[t - 1])` in a loop is `fold`");
+                let example = "fold(fn(all, t) { append(all, f(all[t - 1])) }, [first], 1 .. n)";
+                let others = "`x[k] ~ d;` makes a random choice; an array is made by `map(f, xs)`";
+                say("values do not change", "", format!("{others}; {next}: `let {name} = {example};`"))
             }
             Token::Fn if self.expects_block() => hint("the body of a function is in braces: `fn f(x) { x + 1 }`"),
             _ if self.expects_name_only() => None,
