@@ -3,6 +3,7 @@
 
 use pcadlang::infer::diagnostics::mcse_mean;
 use pcadlang::lang::value::Value;
+use pcadlang::rng::{Purpose, StreamKey};
 use pcadlang::trace::Draws;
 use pcadlang::{Model, Program, RunOptions};
 
@@ -40,11 +41,12 @@ fn over_a_grid(from: f64, to: f64, log_weight: impl Fn(f64) -> f64) -> f64 {
     weights.iter().enumerate().map(|(i, w)| w * at(i as i32)).sum::<f64>() / sum
 }
 
-/// An ARMA(1, 1) series with mu = 0.4, phi = 0.7, theta = -0.3, and errors that look like normal ones of sd 0.5.
+/// An ARMA(1, 1) series with mu = 0.4, phi = 0.7, theta = -0.3, and normal errors of sd 0.5.
 fn series(n: usize) -> Vec<f64> {
+    let mut rng = StreamKey::new(11, 0, Purpose::VALUES).stream(0, 0, 0);
     let (mut y, mut last) = (Vec::new(), 0.0);
-    for t in 0..n {
-        let err = 0.5 * (((t * 7919 + 13) % 101) as f64 / 101.0 - 0.5) * 12f64.sqrt();
+    for _ in 0..n {
+        let err = 0.5 * rng.standard_normal();
         let before = y.last().copied().unwrap_or(0.4 / 0.3);
         y.push(0.4 + 0.7 * before - 0.3 * last + err);
         last = err;

@@ -28,6 +28,7 @@ mod gp;
 mod half_cauchy;
 mod half_normal;
 mod iid;
+mod interval;
 mod inv_gamma;
 mod laplace;
 mod lkj;

@@ -41,7 +41,7 @@ impl Ordered {
 
     /// A number of each of these; fails unless they are distributions of continuous numbers.
     pub fn of(parts: Vec<Dist>) -> Result<Ordered, ParamError> {
-        let rule = "must be distributions of continuous numbers";
+        let rule = "must hold distributions of continuous numbers";
         if let Some(d) = parts.iter().find(|d| !is_continuous(d)) {
             return Err(ParamError::new("ordered", "d", d.name(), rule));
         }

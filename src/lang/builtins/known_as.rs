@@ -2,7 +2,10 @@
 
 /// Names, and other words for them. Underscores and dots divide words, as in what is searched for.
 pub(super) const KNOWN_AS: &[(&str, &str)] = &[
-    ("log_density", "lpdf lpmf logp logpdf logpmf log_prob target score pointwise likelihood"),
+    (
+        "log_density",
+        "normal_lpdf poisson_lpmf bernoulli_logit_lpmf lpdf lpmf logp logpdf logpmf log_prob target score pointwise likelihood",
+    ),
     ("log_joint", "lp__ target logp"),
     ("factor", "target potential"),
     ("truncated", "t[ t truncate truncation bounded bounds censored lower upper cut i("),

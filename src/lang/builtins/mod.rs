@@ -4,6 +4,7 @@
 //! the same arguments give the same value to the last bit, on every platform.
 
 mod args;
+mod compounds;
 mod covariance;
 pub mod data;
 mod definite;
