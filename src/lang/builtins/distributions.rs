@@ -179,7 +179,7 @@ pub(super) const TABLE: &[Row] = &[
         "ordered",
         &[
             arg("d", Type::Any, "A distribution of continuous numbers, or an array of them."),
-            opt("n", Type::Int, "as many as there are in `d`", "How many of one distribution."),
+            opt("n", Type::Int, "none", "How many of one distribution; of an array there is one of each."),
         ],
         ordered,
     ),
