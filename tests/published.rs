@@ -154,3 +154,26 @@ fn mixtures_written_out_are_mixtures() {
         assert!((x - y).abs() < 1e-12 * x.abs().max(1.0), "{x} {y}");
     }
 }
+
+/// The programs beside this file run under their default plans, with gradients.
+#[test]
+fn the_programs_run() {
+    let folder = concat!(env!("CARGO_MANIFEST_DIR"), "/tests/published");
+    let mut seen = 0;
+    for file in std::fs::read_dir(folder).unwrap().map(|f| f.unwrap().path()) {
+        let text = std::fs::read_to_string(&file).unwrap();
+        if text.contains("data y;") {
+            continue;
+        }
+        let model = Model::from_text(&text).unwrap_or_else(|e| panic!("{}: {e}", file.display()));
+        let (_, plan) = model.plan().unwrap_or_else(|e| panic!("{e}"));
+        assert!(plan.is_some_and(|p| p.contains("nuts")), "{}", file.display());
+        let options = RunOptions { seed: 2, steps: Some(100), warmup: Some(100), ..RunOptions::default() };
+        let posterior = model.run(&options, 2, 2).unwrap_or_else(|e| panic!("{}: {e}", file.display()));
+        for q in posterior.quantities() {
+            assert!(q.chains.iter().flatten().all(|x| x.is_finite()), "{}: {}", file.display(), q.name);
+        }
+        seen += 1;
+    }
+    assert_eq!(seen, 6);
+}
