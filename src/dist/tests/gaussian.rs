@@ -160,7 +160,7 @@ fn extreme_covariances_factor() {
 fn jitter_is_a_share_of_the_variance() {
     let k = Covariance::sq_exp(1.0, 3.0).unwrap();
     let with = |jitter: f64| Gp::with_jitter(vec![0.5], &k, &[0.0], true, jitter);
-    for jitter in [0.0, 1e-6, 0.2] {
+    for jitter in [0.0f64, 1e-6, 0.2] {
         let sd = 3.0 * (1.0 + jitter).sqrt();
         let wanted = make("normal", &[0.5, sd]).log_density_num(1.3);
         let found = with(jitter).unwrap().log_density(&vec![1.3].into());
