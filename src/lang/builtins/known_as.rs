@@ -8,7 +8,7 @@ pub(super) const KNOWN_AS: &[(&str, &str)] = &[
     ),
     ("log_joint", "lp__ target logp"),
     ("factor", "target potential"),
-    ("truncated", "t[ t truncate truncation bounded bounds censored lower upper cut i("),
+    ("truncated", "t[ truncate truncation bounded bounds censored lower upper cut i("),
     ("truncated_normal", "t[ truncate truncation bounded bounds"),
     ("flat", "improper uninformative half line halfflat half_flat positive lower upper"),
     ("half_normal", "positive"),

@@ -145,7 +145,6 @@ mod tests {
             ("normal_lpdf", "log_density"),
             ("target", "log_density"),
             ("T[", "truncated"),
-            ("T[0, ]", "truncated"),
             ("truncation", "truncated"),
             ("cholesky_decompose", "cholesky"),
             ("log_determinant", "logdet"),
