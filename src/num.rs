@@ -5,6 +5,7 @@ mod column;
 mod exact;
 mod hash;
 mod incomplete;
+mod log_tails;
 mod saddle;
 pub(crate) mod simd;
 mod special;
@@ -14,6 +15,7 @@ pub use column::Column;
 pub use exact::ExactSum;
 pub use hash::fnv1a;
 pub use incomplete::{chi_square_tail, upper_gamma};
+pub use log_tails::{beta_tails, gamma_tails};
 pub use saddle::{deviance, stirling_error};
 pub use special::{
     LN_SQRT_2PI, digamma, expit, inv_normal_cdf, ln_beta, ln_choose, ln_factorial, ln_gamma, log_diff_exp,

@@ -495,3 +495,87 @@ fn pictures_pull_where_their_score_rises() {
         assert!(cosine > least && (0.8..1.25).contains(&ratio), "{likelihood}: cosine {cosine}, length {ratio}");
     }
 }
+
+/// Densities as numbers, by the value and by what the distribution is made of.
+#[test]
+fn log_densities() {
+    let of = "assume a ~ normal(0.3, 1); assume s ~ gamma(9, 9); assume m ~ normal(0, 1);";
+    for f in [
+        "log_density(normal(a, s), m)",
+        "log_density(normal(a, s), [0.3, m, 2 * a])",
+        "log_density(normal([a, m], s), [0.3, 1])",
+        "log_density(iid(gamma(2, s), 2), [0.3, s])",
+        "log_density(poisson(s), 3)",
+        "log_density(flip(expit(a)), true)",
+        "log_density(mixture([s, 1], [normal(a, 1), normal(0, s)]), m)",
+        "log_density(mv_normal([a, m], cov = [[1 + s, 0.3], [0.3, 1]]), [m, 0.5])",
+        "log_density(gp(m, sq_exp(s) + white(0.3), [0, 0.5, 2]), [a, 1, 0.2])",
+        "log_density(truncated(gamma(2, s), lo = 0.2), 0.9 + s)",
+        "log_sum_exp([log(0.3) + log_density(normal(a, s), m), log(0.7) + log_density(cauchy(0, s), m)])",
+        "log_sum_exp([log_density(gamma(2, s), -1), log_density(normal(a, s), m)])",
+    ] {
+        check(&format!("{of} factor({f} / 4);"));
+    }
+}
+
+#[test]
+fn truncated_and_flat() {
+    let of = "assume a ~ normal(0.3, 1); assume s ~ gamma(9, 9);";
+    for d in [
+        "truncated(normal(a, s), lo = 0)",
+        "truncated(normal(a, s), hi = 1)",
+        "truncated(normal(a, s), -1, 2)",
+        "truncated(student_t(4, a, s), hi = 1)",
+        "truncated(gamma(2, s), 0.3, 2)",
+        "truncated(lognormal(a, s), lo = 0.4)",
+        "truncated(exponential(s), lo = 0)",
+        "truncated(mixture([s, 1], [normal(a, 1), normal(0, s)]), lo = 0.4)",
+        "flat(lo = 0)",
+        "flat(hi = 3)",
+    ] {
+        check(&format!("{of} assume v ~ {d}; observe normal(v, 0.7) = 0.4;"));
+    }
+    for (d, seen) in [
+        ("truncated(poisson(s), lo = 1)", "[3, 1]"),
+        ("truncated(poisson(s), lo = 1, hi = 200)", "[3, 1]"),
+        ("truncated(binomial(9, expit(a)), 1, 7)", "2"),
+        ("truncated(normal([a, 0, s], s), hi = 1.5)", "[0.3, 0.8, 1]"),
+        ("truncated(gamma([2, s, 3], s), [0.1, 0.2, 0.3], 5)", "[0.3, 0.8, 1]"),
+        ("truncated(gamma(2, s), lo = [0.1, 0.2, 0.3])", "[0.3, 0.8, 1]"),
+        ("truncated(iid(weibull(1.4, s), 3), lo = 0.1)", "[0.3, 0.8, 1]"),
+    ] {
+        check(&format!("{of} observe {d} = {seen};"));
+    }
+    // Bounds that move take values along.
+    for d in [
+        "truncated_normal(0.3, s, hi = a)",
+        "truncated(normal(0.3, s), hi = a)",
+        "truncated(cauchy(0.3, s), lo = a)",
+        "flat(lo = a)",
+        "flat(hi = a)",
+    ] {
+        let told = format!("{of} assume v ~ {d}; observe normal(v, 0.7) = 0.4; factor(-(a - s * 0) ** 2);");
+        check(&told);
+    }
+    check(&format!(
+        "{of} assume c ~ ordered([normal(a, s), gamma(2, s), normal(3, 1)]); observe normal(c, 1) = [0, 1, 3];"
+    ));
+    check(&format!("{of} assume c ~ ordered(normal(a, s), 3); observe normal(c, 1) = [0, 1, 3];"));
+}
+
+#[test]
+fn definite_matrices() {
+    let m = "[[2 + s, a, 0.3 * a], [a, 2 + a * a, s / 3], [0.3 * a, s / 3, 1.5 + s]]";
+    for f in [
+        "logdet(m)",
+        "sum(cholesky(m)[2] * [1, 2, 3]) + cholesky(m)[1][0]",
+        "dot(solve(m, [s, 1, a]), [1, 2, 3])",
+        "sum(solve(m, [[s, 1], [1, a], [0.3, 2]])[1] * [2, -1])",
+        "log_density(mv_normal([a, 0, 1], chol = cholesky(m)), [0.3, 0.4, s])",
+        "dot([a, s, 1], solve(m, [a, s, 1])) + logdet(m)",
+    ] {
+        check(&format!(
+            "assume a ~ normal(0.1, 0.3); assume s ~ gamma(9, 9); let m = {m}; factor(-(({f}) - 0.5) ** 2 / 8);"
+        ));
+    }
+}

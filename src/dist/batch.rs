@@ -89,7 +89,7 @@ members! {
     Weibull: 2, |[a, b]| Weibull::new(a, b);
     NegBinomial: 2, |[a, b]| NegBinomial::new(a, b);
     Geometric: 1, |[a]| Geometric::new(a);
-    Flat: 0, |[]| Ok(Flat);
+    Flat: 2, |[lo, hi]| Flat::new(lo, hi);
     Binomial: 2, |[a, b]| Binomial::new(a, b);
     Poisson: 1, |[a]| Poisson::new(a);
 }
@@ -229,7 +229,7 @@ pub(super) fn family(dist: &Dist, params: &[Column]) -> Option<Box<dyn Family>> 
     }
     of!(
         Normal: 2, LogNormal: 2, Uniform: 2, Beta: 2, Gamma: 2, Exponential: 1, HalfNormal: 1, HalfCauchy: 2, StudentT: 3,
-        InvGamma: 2, Cauchy: 2, Laplace: 2, VonMises: 2, Weibull: 2, NegBinomial: 2, Geometric: 1, Flat: 0, Flip: 1,
+        InvGamma: 2, Cauchy: 2, Laplace: 2, VonMises: 2, Weibull: 2, NegBinomial: 2, Geometric: 1, Flat: 2, Flip: 1,
         Binomial: 2, Poisson: 1
     )
 }

@@ -2,9 +2,11 @@
 
 use super::draw::{ln_gamma_draw, x_log_y, x_log1p_y};
 use super::param::positive;
+use super::tails::{Speeds, Tails, speed_by_differences};
 use super::{ParamError, Scalar, Slope, Support};
-use crate::num::{LN_SQRT_2PI, deviance, digamma, expit, ln_beta, stirling_error};
+use crate::num::{LN_SQRT_2PI, beta_tails, deviance, digamma, expit, ln_beta, stirling_error};
 use crate::rng::Stream;
+use smallvec::smallvec;
 
 /// From here on for both parameters, the saddle-point form is used.
 const LARGE: f64 = 64.0;
@@ -70,6 +72,17 @@ impl Scalar for Beta {
         let floor = f64::from_bits(1);
         let by_a = libm::log(x.max(floor)) + all - digamma(a);
         Slope::new(left - right, [by_a, libm::log1p(-x).max(f64::MIN) + all - digamma(b)])
+    }
+
+    fn tails(&self, x: f64) -> Option<Tails> {
+        beta_tails(self.a, self.b, x, 1.0 - x).map(|(below, above)| Tails { below, above })
+    }
+
+    fn speeds(&self, x: f64) -> Option<Speeds> {
+        let own = self.log_density_num(x);
+        let tails = |a, b| beta_tails(a, b, x, 1.0 - x).map(|(below, above)| Tails { below, above });
+        let by_a = speed_by_differences(self.a, own, |a| tails(a, self.b))?;
+        Some(smallvec![by_a, speed_by_differences(self.b, own, |b| tails(self.a, b))?])
     }
 
     fn number_mean(&self) -> Option<f64> {

@@ -2,9 +2,11 @@
 //! transformed rejection (Hörmann 1993, "The generation of binomial random variates", BTRS).
 
 use super::param::{integer, probability};
+use super::tails::{Speeds, Tails};
 use super::{ParamError, Scalar, Slope, Support};
-use crate::num::{LN_SQRT_2PI, deviance, stirling_error};
+use crate::num::{LN_SQRT_2PI, beta_tails, deviance, stirling_error};
 use crate::rng::Stream;
+use smallvec::smallvec;
 
 /// `binomial(n, p)`.
 #[derive(Clone, Copy, Debug, PartialEq)]
@@ -106,6 +108,21 @@ impl Scalar for Binomial {
         let up = if k > 0.0 { k / self.p } else { 0.0 };
         let down = if k < self.n { (self.n - k) / (1.0 - self.p) } else { 0.0 };
         Slope::discrete([0.0, up - down])
+    }
+
+    fn tails(&self, x: f64) -> Option<Tails> {
+        if x < 0.0 {
+            return Some(Tails::NONE_BELOW);
+        }
+        let k = libm::floor(x);
+        if k >= self.n {
+            return Some(Tails::ALL_BELOW);
+        }
+        beta_tails(self.n - k, k + 1.0, 1.0 - self.p, self.p).map(|(below, above)| Tails { below, above })
+    }
+
+    fn speeds(&self, x: f64) -> Option<Speeds> {
+        Some(smallvec![0.0, -(self.n - x) / (1.0 - self.p)])
     }
 
     fn number_mean(&self) -> Option<f64> {

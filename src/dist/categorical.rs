@@ -1,5 +1,6 @@
 //! An index drawn in proportion to weights.
 
+use super::tails::{Speeds, Tails};
 use super::{ParamError, Scalar, Slope, Support};
 use crate::rng::Stream;
 use std::sync::Arc;
@@ -84,6 +85,21 @@ impl Scalar for Categorical {
             *s += 1.0 / w;
         }
         slope
+    }
+
+    fn tails(&self, x: f64) -> Option<Tails> {
+        let split = if x < 0.0 { 0 } else { (libm::floor(x) as usize).saturating_add(1).min(self.weights.len()) };
+        let (below, above) = self.weights.split_at(split);
+        let part = |all: &[f64]| libm::log((all.iter().sum::<f64>() / self.total).min(1.0));
+        Some(Tails { below: part(below), above: part(above) })
+    }
+
+    fn speeds(&self, x: f64) -> Option<Speeds> {
+        let split = (libm::floor(x).max(-1.0) + 1.0) as usize;
+        let own = libm::exp(self.log_density_num(x));
+        let below = libm::exp(self.tails(x)?.below);
+        let by = |i: usize| (f64::from(u8::from(i < split)) - below) / self.total / own;
+        Some((0..self.weights.len()).map(by).collect())
     }
 
     fn number_mean(&self) -> Option<f64> {

@@ -2,8 +2,10 @@
 
 use super::draw::{log1p_square, standard};
 use super::param::{finite, positive};
+use super::tails::{Speeds, Tails};
 use super::{ParamError, Scalar, Slope, Support};
 use crate::rng::Stream;
+use smallvec::smallvec;
 
 /// `cauchy(location, scale)`. It has no mean.
 #[derive(Clone, Copy, Debug, PartialEq)]
@@ -56,6 +58,16 @@ impl Scalar for Cauchy {
 
     fn slope(&self, x: f64) -> Slope {
         cauchy_slope(x, self.location, self.scale)
+    }
+
+    fn tails(&self, x: f64) -> Option<Tails> {
+        let z = standard(x, self.location, self.scale);
+        let part = |x: f64| libm::log(libm::atan2(1.0, x) * core::f64::consts::FRAC_1_PI);
+        Some(Tails { below: part(-z), above: part(z) })
+    }
+
+    fn speeds(&self, x: f64) -> Option<Speeds> {
+        Some(smallvec![-1.0, -standard(x, self.location, self.scale)])
     }
 
     fn number_mean(&self) -> Option<f64> {

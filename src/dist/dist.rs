@@ -31,6 +31,7 @@ pub enum Dist {
     Poisson(Poisson),
     Categorical(Categorical),
     TruncatedNormal(Arc<TruncatedNormal>),
+    Truncated(Arc<Truncated>),
     Multinomial(Arc<Multinomial>),
     Lkj(Arc<Lkj>),
     Wishart(Arc<Wishart>),
@@ -69,6 +70,7 @@ macro_rules! each {
             Dist::Geometric($d) => $body,
             Dist::Flat($d) => $body,
             Dist::TruncatedNormal($d) => $body,
+            Dist::Truncated($d) => $body,
             Dist::Multinomial($d) => $body,
             Dist::Lkj($d) => $body,
             Dist::Wishart($d) => $body,
@@ -188,7 +190,8 @@ impl Dist {
         };
         match self {
             Dist::Iid(d) => Some(inside(std::slice::from_ref(d.one()))?.saturating_mul(d.len())),
-            Dist::Ordered(d) => Some(inside(std::slice::from_ref(d.one()))?.saturating_mul(d.len())),
+            Dist::Ordered(d) => Some(inside(d.distinct())?.saturating_mul(d.repeats())),
+            Dist::Truncated(d) => inside(std::slice::from_ref(d.base())),
             Dist::Product(d) => inside(d.parts()),
             Dist::Mixture(d) => inside(d.components()),
             _ => Some(1),
@@ -197,7 +200,7 @@ impl Dist {
 
     /// Whether it is made of others.
     fn is_compound(&self) -> bool {
-        matches!(self, Dist::Iid(_) | Dist::Ordered(_) | Dist::Product(_) | Dist::Mixture(_))
+        matches!(self, Dist::Iid(_) | Dist::Ordered(_) | Dist::Truncated(_) | Dist::Product(_) | Dist::Mixture(_))
     }
 
     /// The log density of element `i`; -inf if there is none.

@@ -1,8 +1,10 @@
 //! The exponential distribution.
 
 use super::param::positive;
+use super::tails::{Speeds, Tails};
 use super::{ParamError, Scalar, Slope, Support};
 use crate::rng::Stream;
+use smallvec::smallvec;
 
 /// `exponential(rate)`.
 #[derive(Clone, Copy, Debug, PartialEq)]
@@ -37,6 +39,14 @@ impl Scalar for Exponential {
 
     fn slope(&self, x: f64) -> Slope {
         Slope::new(-self.rate, [1.0 / self.rate - x])
+    }
+
+    fn tails(&self, x: f64) -> Option<Tails> {
+        Some(Tails::from_above(-self.rate * x.max(0.0)))
+    }
+
+    fn speeds(&self, x: f64) -> Option<Speeds> {
+        Some(smallvec![x / self.rate])
     }
 
     fn number_mean(&self) -> Option<f64> {

@@ -120,6 +120,17 @@ pub const FAMILIES: &[Family] = &[
         "normal(mean, sd) at x / (Phi((hi - mean) / sd) - Phi((lo - mean) / sd))",
     ),
     family(
+        "truncated",
+        "Any distribution of numbers between two bounds; of integers, the bounds are inside.",
+        &[
+            p("d", "A distribution of numbers, or an array of such made by an array parameter."),
+            p("lo", "The lower bound."),
+            p("hi", "The upper bound, above `lo`; of integers it may be `lo`."),
+        ],
+        "lo <= x <= hi, as far as `d` draws numbers there",
+        "that of d over P(lo <= X <= hi), computed in log space",
+    ),
+    family(
         "inv_gamma",
         "The inverse of a gamma number: 1 / x is gamma(shape, rate = scale).",
         &[p("shape", "The shape, positive."), p("scale", "The scale, positive.")],
@@ -179,9 +190,9 @@ pub const FAMILIES: &[Family] = &[
     ),
     family(
         "flat",
-        "The improper flat prior. It cannot be drawn from, so kernels that redraw choices reject; a chain starts at uniform(-2, 2), or where `force` says.",
-        &[],
-        "all numbers",
+        "The improper flat prior, on all numbers or on one side of a bound: flat(lo = 0) for what is positive. It cannot be drawn from, so kernels that redraw choices reject; a chain starts at uniform(-2, 2) in the unconstrained space, or where `force` says.",
+        &[p("lo", "The lower bound."), p("hi", "The upper bound; at most one of them is finite.")],
+        "lo <= x <= hi",
         "1, which has no integral",
     ),
     family(
@@ -273,9 +284,10 @@ pub const FAMILIES: &[Family] = &[
             p("cov", "The covariance function."),
             p("at", "The points."),
             p("centred", "Stores the values, instead of the white noise that makes them."),
+            p("jitter", "What is added to the diagonal of the covariance matrix, as a share of the variance."),
         ],
         "arrays as long as `at`",
-        "mv_normal(mean, K) with K[i][j] = cov(at[i], at[j]), and 1e-6 of the variance more on the diagonal",
+        "mv_normal(mean, K) with K[i][j] = cov(at[i], at[j]), and jitter times the variance more on the diagonal",
     ),
     family(
         "iid",
@@ -286,10 +298,13 @@ pub const FAMILIES: &[Family] = &[
     ),
     family(
         "ordered",
-        "Independent numbers of one distribution, in ascending order: one choice.",
-        &[p("d", "A distribution of continuous numbers."), p("n", "How many.")],
+        "Independent numbers in ascending order, one choice: n of one distribution, or one of each in a list. A list of unlike ones is not normalised, so like `flat` it cannot be drawn from: kernels that redraw choices reject.",
+        &[
+            p("d", "A distribution of continuous numbers, or an array of them."),
+            p("n", "How many; left out for an array of distributions."),
+        ],
         "ascending arrays of n values of d",
-        "n! times the product of the densities of d",
+        "n! times the product of the densities of d; of an array, the product of theirs, not divided by the probability of that order (a constant only while their parameters stay)",
     ),
     family(
         "mixture",

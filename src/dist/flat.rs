@@ -1,32 +1,66 @@
-//! The improper flat prior: density 1 everywhere, so not a distribution that could be drawn from.
+//! The improper flat prior: density 1 between its bounds, so not a distribution that could be drawn from.
 
-use super::{Scalar, Slope, Support};
+use super::{ParamError, Scalar, Slope, Support};
 use crate::rng::Stream;
 
-/// `flat()`. Its log density is 0 at every number. What it "draws" is a start for a chain only: uniform(-2, 2), as in Stan.
-#[derive(Clone, Copy, Debug, Default, PartialEq)]
-pub struct Flat;
+/// `flat(lo, hi)`: all numbers, or those on one side of a bound. Its log density is 0 there. What it "draws" is a start for a chain
+/// only: as in Stan, uniform(-2, 2) in the unconstrained space.
+#[derive(Clone, Copy, Debug, PartialEq)]
+pub struct Flat {
+    lo: f64,
+    hi: f64,
+}
+
+impl Default for Flat {
+    fn default() -> Self {
+        Flat { lo: f64::NEG_INFINITY, hi: f64::INFINITY }
+    }
+}
+
+impl Flat {
+    /// Between these bounds, at least one of them infinite; fails for others, and for bounds that leave nothing.
+    pub fn new(lo: f64, hi: f64) -> Result<Flat, ParamError> {
+        let bad = |rule| Err(ParamError::new(Self::NAME, "lo to hi", format!("{lo} and {hi}"), rule));
+        match () {
+            () if lo.is_nan() || hi.is_nan() => bad("must be numbers"),
+            () if lo >= hi || lo == f64::INFINITY || hi == f64::NEG_INFINITY => bad("must leave numbers between them"),
+            () if lo.is_finite() && hi.is_finite() => {
+                bad("must have an infinite end: between two bounds it is uniform(lo, hi), which can be drawn from")
+            }
+            () => Ok(Flat { lo, hi }),
+        }
+    }
+
+    /// Whether it has a bound.
+    pub(super) fn is_bounded(&self) -> bool {
+        self.lo.is_finite() || self.hi.is_finite()
+    }
+}
 
 impl Scalar for Flat {
     const NAME: &'static str = "flat";
     const IMPROPER: bool = true;
 
     fn number_support(&self) -> Support {
-        Support::Real
+        match (self.lo, self.hi) {
+            (lo, _) if lo.is_finite() => Support::AtLeast { lo },
+            (_, hi) if hi.is_finite() => Support::AtMost { hi },
+            _ => Support::Real,
+        }
     }
 
-    /// A place to start from, uniform on (-2, 2).
+    /// A place to start from, uniform on (-2, 2) in the unconstrained space.
     fn draw(&self, rng: &mut Stream) -> f64 {
-        4.0 * rng.open_uniform() - 2.0
+        self.number_support().from_free_scalar(4.0 * rng.open_uniform() - 2.0).0
     }
 
     #[inline]
     fn log_density_num(&self, x: f64) -> f64 {
-        if x.is_finite() { 0.0 } else { f64::NEG_INFINITY }
+        if x.is_finite() && x >= self.lo && x <= self.hi { 0.0 } else { f64::NEG_INFINITY }
     }
 
     fn slope(&self, _x: f64) -> Slope {
-        Slope::new(0.0, [])
+        Slope::new(0.0, [0.0, 0.0])
     }
 
     fn number_mean(&self) -> Option<f64> {

@@ -2,9 +2,11 @@
 
 use super::draw::{gamma_draw, ln_gamma_draw, representable, x_log_y};
 use super::param::positive;
+use super::tails::{Speeds, Tails, speed_by_differences};
 use super::{ParamError, Scalar, Slope, Support};
-use crate::num::{LN_SQRT_2PI, deviance, digamma, ln_gamma, stirling_error};
+use crate::num::{LN_SQRT_2PI, deviance, digamma, gamma_tails, ln_gamma, stirling_error};
 use crate::rng::Stream;
+use smallvec::smallvec;
 
 /// From this shape on, the saddle-point form is used.
 const LARGE: f64 = 64.0;
@@ -70,6 +72,16 @@ impl Scalar for Gamma {
         let by_x = (self.shape - 1.0) / x - self.rate;
         let by_shape = libm::log(self.rate) + libm::log(x) - digamma(self.shape);
         Slope::new(by_x, [by_shape, self.shape / self.rate - x])
+    }
+
+    fn tails(&self, x: f64) -> Option<Tails> {
+        gamma_tails(self.shape, self.rate * x).map(|(below, above)| Tails { below, above })
+    }
+
+    fn speeds(&self, x: f64) -> Option<Speeds> {
+        let own = self.log_density_num(x);
+        let tails = |a| gamma_tails(a, self.rate * x).map(|(below, above)| Tails { below, above });
+        Some(smallvec![speed_by_differences(self.shape, own, tails)?, x / self.rate])
     }
 
     fn number_mean(&self) -> Option<f64> {

@@ -1,8 +1,10 @@
 //! The geometric distribution: failures before the first success.
 
 use super::neg_binomial::success;
+use super::tails::{Speeds, Tails};
 use super::{ParamError, Scalar, Slope, Support};
 use crate::rng::Stream;
+use smallvec::smallvec;
 
 /// `geometric(p)`, from 0.
 #[derive(Clone, Copy, Debug, PartialEq)]
@@ -44,6 +46,18 @@ impl Scalar for Geometric {
     fn slope(&self, k: f64) -> Slope {
         let down = if k > 0.0 { k / (1.0 - self.p) } else { 0.0 };
         Slope::discrete([1.0 / self.p - down])
+    }
+
+    fn tails(&self, x: f64) -> Option<Tails> {
+        if x < 0.0 {
+            return Some(Tails::NONE_BELOW);
+        }
+        let k = libm::floor(x);
+        Some(Tails::from_above((k + 1.0) * libm::log1p(-self.p)))
+    }
+
+    fn speeds(&self, x: f64) -> Option<Speeds> {
+        Some(smallvec![(x + 1.0) / self.p])
     }
 
     fn number_mean(&self) -> Option<f64> {

@@ -8,20 +8,34 @@ use super::{Covariance, ParamError};
 /// The most points: the time to factor their covariance grows as the cube of their number.
 const MOST_POINTS: usize = 4000;
 
-/// What is added to the diagonal of the covariance matrix, as a share of the variance: part of the model.
-const JITTER: f64 = 1e-6;
+/// What is added to the diagonal of the covariance matrix, as a share of the variance, unless said otherwise: part of the model.
+pub const JITTER: f64 = 1e-6;
 
-/// `gp(mean, cov, at)`.
+/// `gp(mean, cov, at)`, with a jitter of [`JITTER`] unless there is another.
 ///
-/// Its choice is stored as white noise z ~ N(0, I), with value = mean + chol(K + 1e-6 variance I) z, so that the values follow
+/// Its choice is stored as white noise z ~ N(0, I), with value = mean + chol(K + jitter variance I) z, so that the values follow
 /// when a parameter of the covariance moves; a centred one stores the values. Gradients are by the mean only.
 #[derive(Clone, Debug, PartialEq)]
-pub struct Gp(Gaussian);
+pub struct Gp(Gaussian, f64);
 
 impl Gp {
     /// With these means and this covariance function at these points; fails unless there are as many means as points, all
     /// finite, and the covariance matrix has a Cholesky factor.
     pub fn new(mean: Vec<f64>, cov: &Covariance, at: &[f64], centred: bool) -> Result<Gp, ParamError> {
+        Gp::with_jitter(mean, cov, at, centred, JITTER)
+    }
+
+    /// The same with another share of the variance added to the diagonal; fails unless it is finite and not negative, too.
+    pub fn with_jitter(
+        mean: Vec<f64>,
+        cov: &Covariance,
+        at: &[f64],
+        centred: bool,
+        jitter: f64,
+    ) -> Result<Gp, ParamError> {
+        if !(jitter >= 0.0 && jitter.is_finite()) {
+            return Err(ParamError::new("gp", "jitter", jitter, "must be finite and not negative"));
+        }
         if mean.len() != at.len() {
             let value = format!("{} for {}", mean.len(), at.len());
             return Err(ParamError::new("gp", "mean", value, "must have a number for each point"));
@@ -36,18 +50,18 @@ impl Gp {
         for x in at {
             finite("gp", "at", *x)?;
         }
-        let packed = cov.packed(at, JITTER * cov.variance());
+        let packed = cov.packed(at, jitter * cov.variance());
         let singular = || {
             let value = format!("{cov} at {} points", at.len());
             ParamError::new("gp", "cov", value, "must make a positive definite matrix")
         };
         let factor = Factor::new(at.len(), packed).ok_or_else(singular)?;
-        Ok(Gp(Gaussian { mean: mean.into(), factor, whitened: !centred }))
+        Ok(Gp(Gaussian { mean: mean.into(), factor, whitened: !centred }, jitter))
     }
 
     /// The same process, storing values.
     pub fn to_centred(&self) -> Gp {
-        Gp(self.0.centred())
+        Gp(self.0.centred(), self.1)
     }
 
     /// The derivatives by its Cholesky factor, the lower triangle by rows: of the log density of a stored value; of one stored as
@@ -65,7 +79,7 @@ impl Gp {
             for y in &at[..i] {
                 cov.pull(Some((x - y).abs()), entries.next()?, &mut out);
             }
-            cov.pull(None, entries.next()? * (1.0 + JITTER), &mut out);
+            cov.pull(None, entries.next()? * (1.0 + self.1), &mut out);
         }
         Some(out)
     }

@@ -3,8 +3,10 @@
 use super::cauchy::cauchy_slope;
 use super::draw::log1p_square;
 use super::param::{finite, positive};
+use super::tails::{Speeds, Tails};
 use super::{ParamError, Scalar, Slope, Support};
 use crate::rng::Stream;
+use smallvec::smallvec;
 
 /// `half_cauchy(location, scale)`, on [location, inf).
 #[derive(Clone, Copy, Debug, PartialEq)]
@@ -46,6 +48,16 @@ impl Scalar for HalfCauchy {
 
     fn slope(&self, x: f64) -> Slope {
         cauchy_slope(x, self.location, self.scale)
+    }
+
+    fn tails(&self, x: f64) -> Option<Tails> {
+        let z = ((x - self.location) / self.scale).max(0.0);
+        let part = |y: f64, x: f64| libm::log(libm::atan2(y, x) * core::f64::consts::FRAC_2_PI);
+        Some(Tails { below: part(z, 1.0), above: part(1.0, z) })
+    }
+
+    fn speeds(&self, x: f64) -> Option<Speeds> {
+        Some(smallvec![-1.0, -(x - self.location) / self.scale])
     }
 
     fn number_mean(&self) -> Option<f64> {

@@ -1,9 +1,11 @@
 //! The half-normal distribution: the size of a centred normal number.
 
 use super::param::positive;
+use super::tails::{Speeds, Tails};
 use super::{ParamError, Scalar, Slope, Support};
-use crate::num::LN_SQRT_2PI;
+use crate::num::{LN_SQRT_2PI, log_normal_cdf};
 use crate::rng::Stream;
+use smallvec::smallvec;
 
 /// `half_normal(sd)`.
 #[derive(Clone, Copy, Debug, PartialEq)]
@@ -44,6 +46,19 @@ impl Scalar for HalfNormal {
     fn slope(&self, x: f64) -> Slope {
         let z = x / self.sd;
         Slope::new(-z / self.sd, [(z * z - 1.0) / self.sd])
+    }
+
+    fn tails(&self, x: f64) -> Option<Tails> {
+        if x <= 0.0 {
+            return Some(Tails::NONE_BELOW);
+        }
+        let z = x / self.sd;
+        let above = core::f64::consts::LN_2 + log_normal_cdf(-z);
+        Some(Tails { below: libm::log(libm::erf(z * core::f64::consts::FRAC_1_SQRT_2)), above: above.min(0.0) })
+    }
+
+    fn speeds(&self, x: f64) -> Option<Speeds> {
+        Some(smallvec![-x / self.sd])
     }
 
     fn number_mean(&self) -> Option<f64> {

@@ -2,9 +2,11 @@
 
 use super::draw::{ln_gamma_draw, representable};
 use super::param::positive;
+use super::tails::{Speeds, Tails, speed_by_differences};
 use super::{ParamError, Scalar, Slope, Support};
-use crate::num::{LN_SQRT_2PI, deviance, digamma, ln_gamma, stirling_error};
+use crate::num::{LN_SQRT_2PI, deviance, digamma, gamma_tails, ln_gamma, stirling_error};
 use crate::rng::Stream;
+use smallvec::smallvec;
 
 /// From this shape on, the saddle-point form is used.
 const LARGE: f64 = 64.0;
@@ -69,6 +71,19 @@ impl Scalar for InvGamma {
         let t = self.scale / x;
         let by_shape = self.log_ratio(x) - digamma(self.shape);
         Slope::new((t - self.shape - 1.0) / x, [by_shape, (self.shape - t) / self.scale])
+    }
+
+    fn tails(&self, x: f64) -> Option<Tails> {
+        if x <= 0.0 {
+            return Some(Tails::NONE_BELOW);
+        }
+        gamma_tails(self.shape, self.scale / x).map(|(above, below)| Tails { below, above })
+    }
+
+    fn speeds(&self, x: f64) -> Option<Speeds> {
+        let own = self.log_density_num(x);
+        let tails = |a| gamma_tails(a, self.scale / x).map(|(above, below)| Tails { below, above });
+        Some(smallvec![speed_by_differences(self.shape, own, tails)?, -x / self.scale])
     }
 
     fn number_mean(&self) -> Option<f64> {

@@ -2,8 +2,10 @@
 
 use super::draw::standard;
 use super::param::{finite, positive};
+use super::tails::{Speeds, Tails};
 use super::{ParamError, Scalar, Slope, Support};
 use crate::rng::Stream;
+use smallvec::smallvec;
 
 /// `laplace(location, scale)`. At the location, where the density has a kink, the derivative is taken as 0.
 #[derive(Clone, Copy, Debug, PartialEq)]
@@ -44,6 +46,16 @@ impl Scalar for Laplace {
         let z = standard(x, self.location, self.scale);
         let sign = if z == 0.0 { 0.0 } else { z.signum() };
         Slope::new(-sign / self.scale, [sign / self.scale, (z.abs() - 1.0) / self.scale])
+    }
+
+    fn tails(&self, x: f64) -> Option<Tails> {
+        let z = standard(x, self.location, self.scale);
+        let tails = Tails::from_below(-z.abs() - core::f64::consts::LN_2);
+        Some(if z < 0.0 { tails } else { tails.swapped() })
+    }
+
+    fn speeds(&self, x: f64) -> Option<Speeds> {
+        Some(smallvec![-1.0, -standard(x, self.location, self.scale)])
     }
 
     fn number_mean(&self) -> Option<f64> {

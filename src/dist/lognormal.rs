@@ -2,9 +2,11 @@
 
 use super::draw::representable;
 use super::param::{finite, positive};
+use super::tails::{Speeds, Tails};
 use super::{ParamError, Scalar, Slope, Support};
-use crate::num::LN_SQRT_2PI;
+use crate::num::{LN_SQRT_2PI, log_normal_cdf};
 use crate::rng::Stream;
+use smallvec::smallvec;
 
 /// `lognormal(mu, sigma)`.
 #[derive(Clone, Copy, Debug, PartialEq)]
@@ -46,6 +48,18 @@ impl Scalar for LogNormal {
     fn slope(&self, x: f64) -> Slope {
         let z = (libm::log(x) - self.mu) / self.sigma;
         Slope::new(-(1.0 + z / self.sigma) / x, [z / self.sigma, (z * z - 1.0) / self.sigma])
+    }
+
+    fn tails(&self, x: f64) -> Option<Tails> {
+        if x <= 0.0 {
+            return Some(Tails::NONE_BELOW);
+        }
+        let z = (libm::log(x) - self.mu) / self.sigma;
+        Some(Tails { below: log_normal_cdf(z), above: log_normal_cdf(-z) })
+    }
+
+    fn speeds(&self, x: f64) -> Option<Speeds> {
+        Some(smallvec![-x, -x * (libm::log(x) - self.mu) / self.sigma])
     }
 
     fn number_mean(&self) -> Option<f64> {

@@ -118,7 +118,7 @@ fn bounds(s: &Support) -> Option<(f64, f64)> {
 }
 
 /// The least space around two; `None` if their values are of different kinds.
-fn union(a: Support, b: Support) -> Option<Support> {
+pub(super) fn union(a: Support, b: Support) -> Option<Support> {
     if a == b {
         return Some(a);
     }

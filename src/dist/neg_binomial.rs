@@ -2,9 +2,11 @@
 
 use super::draw::ln_gamma_draw;
 use super::param::{MAX_INTEGER, positive};
+use super::tails::{Speeds, Tails, speed_by_differences};
 use super::{ParamError, Poisson, Scalar, Slope, Support};
-use crate::num::{LN_SQRT_2PI, deviance, digamma, ln_gamma, stirling_error};
+use crate::num::{LN_SQRT_2PI, beta_tails, deviance, digamma, ln_gamma, stirling_error};
 use crate::rng::Stream;
+use smallvec::smallvec;
 
 /// `neg_binomial(r, p)`: failures before the `r`-th success, as scipy's `nbinom(r, p)`; `r` may be any positive number. Stan's
 /// `neg_binomial(alpha, beta)` has r = alpha, p = beta / (1 + beta).
@@ -73,6 +75,20 @@ impl Scalar for NegBinomial {
         let by_r = if k > 0.0 { digamma(k + r) - digamma(r) + libm::log(p) } else { libm::log(p) };
         let down = if k > 0.0 { k / (1.0 - p) } else { 0.0 };
         Slope::discrete([by_r, r / p - down])
+    }
+
+    fn tails(&self, x: f64) -> Option<Tails> {
+        if x < 0.0 {
+            return Some(Tails::NONE_BELOW);
+        }
+        let k = libm::floor(x);
+        beta_tails(self.r, k + 1.0, self.p, 1.0 - self.p).map(|(below, above)| Tails { below, above })
+    }
+
+    fn speeds(&self, x: f64) -> Option<Speeds> {
+        let tails = |r| beta_tails(r, x + 1.0, self.p, 1.0 - self.p).map(|(below, above)| Tails { below, above });
+        let by_r = speed_by_differences(self.r, self.log_density_num(x), tails)?;
+        Some(smallvec![by_r, (self.r + x) / self.p])
     }
 
     fn number_mean(&self) -> Option<f64> {

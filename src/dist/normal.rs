@@ -2,9 +2,11 @@
 
 use super::draw::standard;
 use super::param::{finite, positive};
+use super::tails::{Speeds, Tails};
 use super::{ParamError, Scalar, Slope, Support};
-use crate::num::LN_SQRT_2PI;
+use crate::num::{LN_SQRT_2PI, log_normal_cdf};
 use crate::rng::Stream;
+use smallvec::smallvec;
 
 /// `normal(mean, sd)`.
 #[derive(Clone, Copy, Debug, PartialEq)]
@@ -51,6 +53,15 @@ impl Scalar for Normal {
     fn slope(&self, x: f64) -> Slope {
         let z = standard(x, self.mean, self.sd);
         Slope::new(-z / self.sd, [z / self.sd, (z * z - 1.0) / self.sd])
+    }
+
+    fn tails(&self, x: f64) -> Option<Tails> {
+        let z = standard(x, self.mean, self.sd);
+        Some(Tails { below: log_normal_cdf(z), above: log_normal_cdf(-z) })
+    }
+
+    fn speeds(&self, x: f64) -> Option<Speeds> {
+        Some(smallvec![-1.0, -standard(x, self.mean, self.sd)])
     }
 
     fn number_mean(&self) -> Option<f64> {

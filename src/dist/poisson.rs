@@ -2,9 +2,11 @@
 //! rejection (Hörmann 1993, "The transformed rejection method for generating Poisson random variables", PTRS).
 
 use super::param::MAX_INTEGER;
+use super::tails::{Speeds, Tails};
 use super::{ParamError, Scalar, Slope, Support};
-use crate::num::{LN_SQRT_2PI, deviance, stirling_error};
+use crate::num::{LN_SQRT_2PI, deviance, gamma_tails, stirling_error};
 use crate::rng::Stream;
+use smallvec::smallvec;
 
 /// `poisson(rate)`; with rate 0 it is always 0.
 #[derive(Clone, Copy, Debug, PartialEq)]
@@ -79,6 +81,19 @@ impl Scalar for Poisson {
 
     fn slope(&self, k: f64) -> Slope {
         Slope::discrete([if k > 0.0 { k / self.rate - 1.0 } else { -1.0 }])
+    }
+
+    fn tails(&self, x: f64) -> Option<Tails> {
+        if x < 0.0 {
+            return Some(Tails::NONE_BELOW);
+        }
+        let k = libm::floor(x);
+        gamma_tails(k + 1.0, self.rate).map(|(above, below)| Tails { below, above })
+    }
+
+    fn speeds(&self, x: f64) -> Option<Speeds> {
+        let _ = x;
+        Some(smallvec![-1.0])
     }
 
     fn number_mean(&self) -> Option<f64> {

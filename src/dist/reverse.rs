@@ -24,10 +24,10 @@ impl Dist {
             Dist::Iid(d) => d.one().has_moving_support(),
             Dist::Product(d) => d.parts().iter().any(Dist::has_moving_support),
             Dist::Custom(d) => d.has_moving_support(),
-            Dist::Ordered(_) | Dist::Mixture(_) => matches!(
-                self.support(),
-                Support::Interval { .. } | Support::AtLeast { .. } | Support::AtMost { .. } | Support::Ascending(..)
-            ),
+            Dist::Truncated(_) => true,
+            Dist::Flat(d) => d.is_bounded(),
+            Dist::Ordered(d) => d.distinct().iter().any(Dist::has_moving_support),
+            Dist::Mixture(d) => d.components().iter().any(Dist::has_moving_support),
             _ => false,
         }
     }
@@ -51,6 +51,16 @@ impl Dist {
             Dist::Uniform(_) => Some(vec![lo, hi]),
             Dist::TruncatedNormal(_) => Some(vec![0.0, 0.0, lo, hi]),
             Dist::HalfCauchy(_) => Some(vec![lo, 0.0]),
+            Dist::Flat(_) => Some(vec![lo, hi]),
+            Dist::Truncated(d) => {
+                let (own_lo, own_hi) = d.own_bounds();
+                if d.base().has_moving_support() && !(own_lo && own_hi) {
+                    return None;
+                }
+                let mut by = vec![0.0; d.base().param_count()];
+                by.extend([if own_lo { lo } else { 0.0 }, if own_hi { hi } else { 0.0 }]);
+                Some(by)
+            }
             d if d.has_moving_support() => None,
             d => Some(vec![0.0; d.param_count()]),
         }

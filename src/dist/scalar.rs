@@ -1,5 +1,6 @@
 //! Distributions of one number: a smaller interface that allocates nothing, and [`Distribution`] built on it.
 
+use super::tails::{Speeds, Tails};
 use super::{Datum, Distribution, Gradient, Support};
 use crate::rng::Stream;
 use smallvec::SmallVec;
@@ -45,6 +46,17 @@ pub trait Scalar: fmt::Debug + Send + Sync {
 
     /// Its derivatives at a point where it is finite.
     fn slope(&self, x: f64) -> Slope;
+
+    /// How much lies to each side of a number, if the family knows.
+    fn tails(&self, _x: f64) -> Option<Tails> {
+        None
+    }
+
+    /// dP(X <= x)/da over the density at x, for each parameter a, where the density is positive and finite; of an integer
+    /// parameter 0.
+    fn speeds(&self, _x: f64) -> Option<Speeds> {
+        None
+    }
 
     /// The mean, if it exists.
     fn number_mean(&self) -> Option<f64>;

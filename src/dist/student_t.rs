@@ -2,9 +2,11 @@
 
 use super::draw::{far_square, ln_gamma_draw, standard};
 use super::param::{finite, positive};
+use super::tails::{Speeds, Tails, speed_by_differences};
 use super::{ParamError, Scalar, Slope, Support};
-use crate::num::{digamma, ln_beta};
+use crate::num::{beta_tails, digamma, ln_beta};
 use crate::rng::Stream;
+use smallvec::smallvec;
 
 /// `student_t(df, location, scale)`.
 #[derive(Clone, Copy, Debug, PartialEq)]
@@ -73,6 +75,16 @@ impl Scalar for StudentT {
         Slope::new(-by_x, [by_df, by_x, (twice - 1.0) / self.scale])
     }
 
+    fn tails(&self, x: f64) -> Option<Tails> {
+        student_tails(self.df, standard(x, self.location, self.scale))
+    }
+
+    fn speeds(&self, x: f64) -> Option<Speeds> {
+        let z = standard(x, self.location, self.scale);
+        let by_df = speed_by_differences(self.df, self.log_density_num(x), |df| student_tails(df, z))?;
+        Some(smallvec![by_df, -1.0, -z])
+    }
+
     fn number_mean(&self) -> Option<f64> {
         (self.df > 1.0).then_some(self.location)
     }
@@ -80,4 +92,13 @@ impl Scalar for StudentT {
     fn number_sd(&self) -> Option<f64> {
         (self.df > 2.0).then(|| self.scale * (self.df / (self.df - 2.0)).sqrt())
     }
+}
+
+/// The tails of the standard distribution, by the incomplete beta function of df / (df + z^2) (Abramowitz & Stegun 26.7.1).
+fn student_tails(df: f64, z: f64) -> Option<Tails> {
+    let square = z * z;
+    let (x, y) = (1.0 / (1.0 + square / df), 1.0 / (1.0 + df / square));
+    let (beyond, _) = beta_tails(0.5 * df, 0.5, x, y)?;
+    let tails = Tails::from_below(beyond - core::f64::consts::LN_2);
+    Some(if z < 0.0 { tails } else { tails.swapped() })
 }

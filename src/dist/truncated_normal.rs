@@ -4,6 +4,7 @@
 //! nothing underflows in the tails, where the interval's probability does.
 
 use super::draw::standard;
+use super::interval::integral;
 use super::param::{finite, positive};
 use super::{ParamError, Scalar, Slope, Support};
 use crate::num::mills_ratio;
@@ -12,15 +13,6 @@ use core::f64::consts::{FRAC_1_SQRT_2, FRAC_PI_2};
 
 /// The farthest the interval may be from the mean, in sd: squares are still doubles.
 const FARTHEST: f64 = 1e150;
-
-/// Nodes in (0, 1) and weights of the Gauss-Legendre rule with 10 points on (-1, 1).
-const RULE: [(f64, f64); 5] = [
-    (0.148_874_338_981_631_21, 0.295_524_224_714_752_87),
-    (0.433_395_394_129_247_19, 0.269_266_719_309_996_36),
-    (0.679_409_568_299_024_41, 0.219_086_362_515_982_04),
-    (0.865_063_366_688_984_51, 0.149_451_349_150_580_59),
-    (0.973_906_528_517_171_72, 0.066_671_344_308_688_14),
-];
 
 /// `truncated_normal(mean, sd, lo, hi)`; bounds may be infinite.
 #[derive(Clone, Copy, Debug, PartialEq)]
@@ -128,12 +120,6 @@ impl TruncatedNormal {
             }
         }
     }
-}
-
-/// The integral by the rule.
-fn integral(from: f64, to: f64, f: impl Fn(f64) -> f64) -> f64 {
-    let (centre, half) = (0.5 * (from + to), 0.5 * (to - from));
-    half * RULE.iter().map(|(x, w)| w * (f(centre - half * x) + f(centre + half * x))).sum::<f64>()
 }
 
 impl Scalar for TruncatedNormal {

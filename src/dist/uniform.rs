@@ -1,8 +1,10 @@
 //! The uniform distribution on an interval.
 
 use super::param::finite;
+use super::tails::{Speeds, Tails};
 use super::{ParamError, Scalar, Slope, Support};
 use crate::rng::Stream;
+use smallvec::smallvec;
 
 /// `uniform(lo, hi)`, both ends included.
 #[derive(Clone, Copy, Debug, PartialEq)]
@@ -43,6 +45,17 @@ impl Scalar for Uniform {
     fn slope(&self, _x: f64) -> Slope {
         let inverse = 1.0 / (self.hi - self.lo);
         Slope::new(0.0, [inverse, -inverse])
+    }
+
+    fn tails(&self, x: f64) -> Option<Tails> {
+        let width = self.hi - self.lo;
+        let part = |from: f64, to: f64| libm::log(((to - from) / width).clamp(0.0, 1.0));
+        Some(Tails { below: part(self.lo, x), above: part(x, self.hi) })
+    }
+
+    fn speeds(&self, x: f64) -> Option<Speeds> {
+        let width = self.hi - self.lo;
+        Some(smallvec![-(self.hi - x) / width, -(x - self.lo) / width])
     }
 
     fn number_mean(&self) -> Option<f64> {

@@ -1,8 +1,10 @@
 //! The uniform distribution on a range of integers.
 
 use super::param::integer;
+use super::tails::{Speeds, Tails};
 use super::{ParamError, Scalar, Slope, Support};
 use crate::rng::Stream;
+use smallvec::smallvec;
 
 /// `uniform_discrete(lo, hi)`, both ends included.
 #[derive(Clone, Copy, Debug, PartialEq)]
@@ -42,6 +44,18 @@ impl Scalar for UniformDiscrete {
 
     fn slope(&self, _x: f64) -> Slope {
         Slope::discrete([0.0, 0.0])
+    }
+
+    fn tails(&self, x: f64) -> Option<Tails> {
+        let width = self.hi - self.lo + 1.0;
+        let part = |count: f64| libm::log((count / width).clamp(0.0, 1.0));
+        let k = libm::floor(x);
+        Some(Tails { below: part(k - self.lo + 1.0), above: part(self.hi - k) })
+    }
+
+    fn speeds(&self, x: f64) -> Option<Speeds> {
+        let _ = x;
+        Some(smallvec![0.0, 0.0])
     }
 
     fn number_mean(&self) -> Option<f64> {

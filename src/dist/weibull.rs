@@ -2,9 +2,11 @@
 
 use super::draw::representable;
 use super::param::positive;
+use super::tails::{Speeds, Tails};
 use super::{ParamError, Scalar, Slope, Support};
 use crate::num::ln_gamma;
 use crate::rng::Stream;
+use smallvec::smallvec;
 
 /// `weibull(shape, scale)`: (x / scale)^shape is exponential with rate 1.
 #[derive(Clone, Copy, Debug, PartialEq)]
@@ -57,6 +59,17 @@ impl Scalar for Weibull {
         let excess = libm::expm1(self.shape * log_ratio);
         let by_x = -(1.0 + self.shape * excess) / x;
         Slope::new(by_x, [1.0 / self.shape - log_ratio * excess, self.shape * (excess / self.scale)])
+    }
+
+    fn tails(&self, x: f64) -> Option<Tails> {
+        if x <= 0.0 {
+            return Some(Tails::NONE_BELOW);
+        }
+        Some(Tails::from_above(-libm::exp(self.shape * libm::log(x / self.scale))))
+    }
+
+    fn speeds(&self, x: f64) -> Option<Speeds> {
+        Some(smallvec![x / self.shape * libm::log(x / self.scale), -x / self.scale])
     }
 
     fn number_mean(&self) -> Option<f64> {

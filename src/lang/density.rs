@@ -127,6 +127,22 @@ pub(crate) fn by_arguments(a: &Args, dist: &Dist, params: &[f64]) -> SmallVec<[A
     {
         let each = params.len() / p.len();
         let column = |i: usize| params.chunks_exact(each.max(1)).map(move |c| c.get(i).copied().unwrap_or(0.0));
+        // A truncated one: the parameters of what is truncated, then the bounds.
+        if let Value::Dist(d) = a.get(0) {
+            let own = each.saturating_sub(2);
+            let inner = params.chunks_exact(each.max(1)).map(|c| &c[..own]);
+            let mut of_base = Vec::new();
+            match &**d {
+                Dist::Product(_) => inner.for_each(|c| of_base.extend(c)),
+                _ => inner.for_each(|c| accumulate(&mut of_base, c)),
+            }
+            let bound = |i: usize| match a.get(i) {
+                Value::Num(_) => Adjoint::Num(column(own + i - 1).sum()),
+                Value::Array(_) => Adjoint::Array(column(own + i - 1).collect()),
+                _ => Adjoint::Zero,
+            };
+            return (0..count).map(|i| if i == 0 { Adjoint::Array(of_base.clone()) } else { bound(i) }).collect();
+        }
         let one = |i: usize| match a.get(i) {
             Value::Num(_) => Adjoint::Num(column(i).sum()),
             Value::Array(_) => Adjoint::Array(column(i).collect()),
@@ -143,6 +159,13 @@ pub(crate) fn by_arguments(a: &Args, dist: &Dist, params: &[f64]) -> SmallVec<[A
     let one = |i: usize| -> Adjoint {
         match a.get(i) {
             _ if covariance == Some(i) => Adjoint::Unknown,
+            // The jitter.
+            Value::Num(_) if i == 4 && matches!(dist, Dist::Gp(_)) => Adjoint::Unknown,
+            // A bound left out has a place among the parameters.
+            Value::Unit if matches!(dist, Dist::TruncatedNormal(_) | Dist::Truncated(_) | Dist::Flat(_)) => {
+                take(1);
+                Adjoint::Zero
+            }
             Value::Num(_) if matches!(dist, Dist::Gp(_)) => {
                 Adjoint::Num(take(params.len()).map_or(0.0, |all| all.iter().sum()))
             }

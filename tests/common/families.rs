@@ -19,6 +19,9 @@ pub fn made(family: &str, p: &[f64]) -> Dist {
         ("truncated_normal", [m, s, lo, hi]) => {
             Dist::TruncatedNormal(Arc::new(TruncatedNormal::new(*m, *s, *lo, *hi).unwrap()))
         }
+        (name, [lo, hi, p @ ..]) if name.starts_with("truncated:") => {
+            truncated(&made(&name["truncated:".len()..], p), *lo, *hi).unwrap()
+        }
         ("inv_gamma", [a, b]) => Dist::InvGamma(InvGamma::new(*a, *b).unwrap()),
         ("cauchy", [a, b]) => Dist::Cauchy(Cauchy::new(*a, *b).unwrap()),
         ("laplace", [a, b]) => Dist::Laplace(Laplace::new(*a, *b).unwrap()),

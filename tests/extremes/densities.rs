@@ -79,7 +79,7 @@ fn log_densities_agree_with_formulas() {
     let mut points = Points::of("other log densities");
     let never = f64::NEG_INFINITY;
     for x in [0.0, 5e-324, -1e-300, 1e150, 1e300, f64::MAX, f64::INFINITY, never, f64::NAN] {
-        let got = Dist::Flat(Flat).log_density_num(x);
+        let got = Dist::Flat(Flat::default()).log_density_num(x);
         points.check(got == if x.is_finite() { 0.0 } else { never }, || format!("flat at {x}: {got}"));
     }
     for p in [0.0, 5e-324, 1e-300, 1e-16, 1.0 - 1e-16, 1.0f64] {

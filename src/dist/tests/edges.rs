@@ -118,6 +118,23 @@ fn zoo() -> Vec<Dist> {
     for one in [make("cauchy", &[0.0, 1e300]), make("uniform", &[0.0, 1.0]), make("flat", &[])] {
         all.push(Dist::Ordered(Arc::new(Ordered::new(one, 3).unwrap())));
     }
+    for (family, p, lo, hi) in [
+        ("gamma", &[2.0, 1.0][..], 3000.0, INF),
+        ("gamma", &[1e-3, 1.0], 1e-300, 1e300),
+        ("lognormal", &[0.0, 1.0], 1e10, INF),
+        ("cauchy", &[0.0, 1.0], -1e300, 1e-300),
+        ("student_t", &[3.0, 0.0, 1.0], 1e5, 1e6),
+        ("beta", &[0.01, 0.01], 0.0, 1e-300),
+        ("exponential", &[1.0], 1.0, 1f64.next_up()),
+        ("laplace", &[0.0, 1e-300], -1.0, 1.0),
+        ("poisson", &[1.0], 150.0, INF),
+        ("binomial", &[1e6, 0.5], 0.0, 10.0),
+        ("uniform", &[-1e300, 1e300], 0.0, 1.0),
+    ] {
+        all.push(crate::dist::truncated(&make(family, p), lo, hi).unwrap());
+    }
+    all.push(make("flat", &[1.0, INF]));
+    all.push(make("flat", &[-INF, -1.0]));
     let extremes = vec![make("beta", &[0.01, 0.01]), make("cauchy", &[0.0, 1e300]), make("gamma", &[1e-3, 1.0])];
     all.push(Dist::Mixture(Arc::new(Mixture::new(&[1.0, 1e-300, 0.0], extremes).unwrap())));
     let gp =

@@ -155,3 +155,19 @@ fn extreme_covariances_factor() {
     assert!(Gp::new(vec![0.0; 2], &k, &[0.0, f64::NAN], false).is_err());
     assert!(Gp::new(vec![0.0; 2], &k, &[0.0], false).is_err());
 }
+
+#[test]
+fn jitter_is_a_share_of_the_variance() {
+    let k = Covariance::sq_exp(1.0, 3.0).unwrap();
+    let with = |jitter: f64| Gp::with_jitter(vec![0.5], &k, &[0.0], true, jitter);
+    for jitter in [0.0f64, 1e-6, 0.2] {
+        let sd = 3.0 * (1.0 + jitter).sqrt();
+        let wanted = make("normal", &[0.5, sd]).log_density_num(1.3);
+        let found = with(jitter).unwrap().log_density(&vec![1.3].into());
+        assert!((found - wanted).abs() < 1e-14, "{jitter}: {found} {wanted}");
+    }
+    assert_eq!(with(JITTER).unwrap(), Gp::new(vec![0.5], &k, &[0.0], true).unwrap());
+    assert!([-1e-9, f64::NAN, INF].into_iter().all(|jitter| with(jitter).is_err()));
+    // Points that are one, without any.
+    assert!(Gp::with_jitter(vec![0.0; 2], &k, &[0.0, 0.0], true, 0.0).is_err());
+}

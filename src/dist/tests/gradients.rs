@@ -79,7 +79,7 @@ fn infinite_bounds_and_flat_densities() {
     close(g.params[2], by_lo, "by the lower bound");
     assert_eq!(g.params[3], 0.0);
     let flat = make("flat", &[]).gradient(&Datum::Num(9.0)).unwrap();
-    assert_eq!((flat.x, flat.params), (vec![0.0], vec![]));
+    assert_eq!((flat.x, flat.params), (vec![0.0], vec![0.0; 2]));
     let x: Datum = vec![2.0, 0.0, 5.0].into();
     let at = |w: f64| make("multinomial", &[7.0, 1.0, 0.5, w]).log_density(&x);
     let g = make("multinomial", &[7.0, 1.0, 0.5, 2.0]).gradient(&x).unwrap();

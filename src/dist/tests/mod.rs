@@ -9,6 +9,7 @@ mod mixtures;
 mod normalisation;
 mod samplers;
 mod transforms;
+mod truncated;
 
 use super::*;
 use crate::rng::{Purpose, Stream, StreamKey};
@@ -50,7 +51,10 @@ fn try_make(family: &str, p: &[f64]) -> Result<Dist, ParamError> {
         "weibull" => Dist::Weibull(Weibull::new(p[0], p[1])?),
         "neg_binomial" => Dist::NegBinomial(NegBinomial::new(p[0], p[1])?),
         "geometric" => Dist::Geometric(Geometric::new(p[0])?),
-        "flat" => Dist::Flat(Flat),
+        "flat" => Dist::Flat(match p {
+            [] => Flat::default(),
+            p => Flat::new(p[0], p[1])?,
+        }),
         "multinomial" => Dist::Multinomial(Arc::new(Multinomial::new(p[0], &p[1..])?)),
         "lkj" => Dist::Lkj(Arc::new(Lkj::new(p[0], p[1])?)),
         "flip" => Dist::Flip(Flip::new(p[0])?),

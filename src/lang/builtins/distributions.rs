@@ -3,6 +3,7 @@
 //! Here parameters are read from values. A parameter that is an array makes a product of independent elements, with an
 //! address each. A parameter outside its domain is a recoverable fault: a proposal that leads there is rejected.
 
+use super::compounds::{mixture, ordered, truncated};
 use super::covariance::CovarianceValue;
 use super::elementwise::array_len;
 use super::matrix::Matrix;
@@ -64,6 +65,15 @@ pub(super) const TABLE: &[Row] = &[
             })
         },
     ),
+    other(
+        "truncated",
+        &[
+            arg("d", Type::Dist, "A distribution of numbers."),
+            opt("lo", Type::Nums, "-inf", "The lower bound."),
+            opt("hi", Type::Nums, "inf", "The upper bound, above `lo`; of integers it may be `lo`."),
+        ],
+        truncated,
+    ),
     scalar!("inv_gamma", [shape, scale], dist::InvGamma::new(shape, scale).map(Dist::InvGamma)),
     scalar!("cauchy", [location, scale], dist::Cauchy::new(location, scale).map(Dist::Cauchy)),
     scalar!("laplace", [location, scale], dist::Laplace::new(location, scale).map(Dist::Laplace)),
@@ -78,7 +88,14 @@ pub(super) const TABLE: &[Row] = &[
     scalar!("weibull", [shape, scale], dist::Weibull::new(shape, scale).map(Dist::Weibull)),
     scalar!("neg_binomial", [r, p], dist::NegBinomial::new(r, p).map(Dist::NegBinomial)),
     scalar!("geometric", [p], dist::Geometric::new(p).map(Dist::Geometric)),
-    other("flat", &[], |_| Ok(Dist::Flat(dist::Flat))),
+    other(
+        "flat",
+        &[
+            opt("lo", Type::Nums, "-inf", "The lower bound."),
+            opt("hi", Type::Nums, "inf", "The upper bound; at most one of them is finite."),
+        ],
+        |a| elementwise(a, &UNBOUNDED, |[lo, hi]| dist::Flat::new(lo, hi).map(Dist::Flat)),
+    ),
     scalar!("flip", [p], dist::Flip::new(p).map(Dist::Flip)),
     scalar!("uniform_discrete", [lo, hi], dist::UniformDiscrete::new(lo, hi).map(Dist::UniformDiscrete)),
     scalar!("binomial", [n, p], dist::Binomial::new(n, p).map(Dist::Binomial)),
@@ -149,6 +166,8 @@ pub(super) const TABLE: &[Row] = &[
             arg("cov", Type::Covariance, "The covariance function, such as `sq_exp(length)`."),
             arg("at", Type::Array, "The points."),
             opt("centred", Type::Bool, "false", "Stores the values, instead of the white noise that makes them."),
+            opt("jitter", Type::Num, "1e-6", "What is added to the diagonal of the covariance matrix.")
+                .unit("shares of the variance"),
         ],
         gp,
     ),
@@ -158,11 +177,11 @@ pub(super) const TABLE: &[Row] = &[
     }),
     other(
         "ordered",
-        &[arg("d", Type::Dist, "A distribution of continuous numbers."), arg("n", Type::Int, "How many.")],
-        |a| {
-            let Value::Dist(d) = a.get(0) else { return Err(a.wrong(0, "a distribution")) };
-            dist::Ordered::new(Dist::clone(d), a.count(1)?).map(|d| Dist::Ordered(Arc::new(d))).map_err(fault)
-        },
+        &[
+            arg("d", Type::Any, "A distribution of continuous numbers, or an array of them."),
+            opt("n", Type::Int, "none", "How many of one distribution; of an array there is one of each."),
+        ],
+        ordered,
     ),
     other(
         "mixture",
@@ -174,18 +193,23 @@ pub(super) const TABLE: &[Row] = &[
     ),
 ];
 
+/// The bounds of all numbers.
+pub(super) const UNBOUNDED: [f64; 2] = [f64::NEG_INFINITY, f64::INFINITY];
+
 /// What the reference says of a family besides its arguments.
 pub(super) fn notes(name: &str) -> Vec<(&'static str, String)> {
     let found = FAMILIES.iter().find(|f| f.name == name);
     found.map_or(Vec::new(), |f| vec![("Support", f.support.to_owned()), ("Density", f.formula.to_owned())])
 }
 
-fn fault(e: ParamError) -> Fault {
+/// A parameter outside its domain, with a hint where there is one.
+pub(super) fn fault(e: ParamError) -> Fault {
     let fault = Fault::domain(e.to_string());
-    match e.rule.starts_with("must be positive") {
-        true => fault
+    match e.rule {
+        rule if rule.starts_with("must be positive") => fault
             .with_hint("what must be positive is drawn from half_normal, gamma or lognormal, or is exp of a number"),
-        false => fault,
+        "must make a positive definite matrix" => fault.with_hint("a larger `jitter` makes it so, or `+ white(sd)`"),
+        _ => fault,
     }
 }
 
@@ -266,16 +290,6 @@ fn wishart(a: &Args) -> Result<Dist, Fault> {
     dist::Wishart::new(a.num(0)?, &scale).map(|d| Dist::Wishart(Arc::new(d))).map_err(fault)
 }
 
-fn mixture(a: &Args) -> Result<Dist, Fault> {
-    let components = a.elements(1)?;
-    let component = |v: &Value| match v {
-        Value::Dist(d) => Ok(Dist::clone(d)),
-        other => Err(a.element_wrong(1, "an array of distributions", other)),
-    };
-    let components = components.iter().map(component).collect::<Result<Vec<_>, _>>()?;
-    dist::Mixture::new(&a.array(0)?, components).map(|d| Dist::Mixture(Arc::new(d))).map_err(fault)
-}
-
 /// A square matrix as large as the mean.
 fn square(a: &Args, i: usize, n: usize) -> Result<nalgebra::DMatrix<f64>, Fault> {
     let m = Matrix::read(a, i)?;
@@ -299,7 +313,8 @@ fn gp(a: &Args) -> Result<Dist, Fault> {
         return Err(a.wrong_length(0, &format!("as many elements as there are points, {}", at.len())));
     }
     let centred = a.bool_or(3, false)?;
-    dist::Gp::new(mean, cov, &at, centred).map(|d| Dist::Gp(Arc::new(d))).map_err(fault)
+    let jitter = a.num_or(4, dist::JITTER)?;
+    dist::Gp::with_jitter(mean, cov, &at, centred, jitter).map(|d| Dist::Gp(Arc::new(d))).map_err(fault)
 }
 
 /// The family of a name, found while compiling.

@@ -4,8 +4,10 @@
 //! the same arguments give the same value to the last bit, on every platform.
 
 mod args;
+mod compounds;
 mod covariance;
 pub mod data;
+mod definite;
 mod derivative;
 mod distributions;
 pub mod doc;
@@ -15,7 +17,9 @@ mod foreign;
 mod forms;
 mod inference;
 mod interp;
+mod known_as;
 mod list;
+mod log_density;
 mod math;
 mod matrix;
 mod operators;

@@ -1,5 +1,6 @@
 //! Finding built-ins by what is said of them.
 
+use super::known_as::KNOWN_AS;
 use super::{Builtin, Table};
 use crate::diag::nearest;
 
@@ -54,11 +55,16 @@ struct Text<'t> {
     section: Vec<String>,
     doc: Vec<String>,
     args: Vec<String>,
+    /// Words that other languages have for it.
+    elsewhere: Vec<String>,
 }
 
 impl<'t> Text<'t> {
     fn new(of: &'t Builtin) -> Self {
         let args = of.args.iter().flat_map(|arg| words_of(&arg.name).chain(words_of(&arg.doc)));
+        let known = KNOWN_AS.iter().find(|(name, _)| of.module.is_empty() && *name == of.name);
+        let elsewhere =
+            known.into_iter().flat_map(|(_, words)| words_of(words).chain(words.split(' ').map(str::to_owned)));
         Text {
             of,
             name: of.name.to_lowercase(),
@@ -66,11 +72,12 @@ impl<'t> Text<'t> {
             section: words_of(&of.section).collect(),
             doc: words_of(&of.doc).collect(),
             args: args.collect(),
+            elsewhere: elsewhere.collect(),
         }
     }
 
     fn words(&self) -> impl Iterator<Item = &str> {
-        let all = [&self.parts, &self.section, &self.doc, &self.args].into_iter().flatten();
+        let all = [&self.parts, &self.section, &self.doc, &self.args, &self.elsewhere].into_iter().flatten();
         all.map(String::as_str).chain(std::iter::once(self.name.as_str()))
     }
 
@@ -82,6 +89,7 @@ impl<'t> Text<'t> {
             () if self.name == word || self.of.full_name().to_lowercase() == word => 64,
             () if is(&self.parts) => 32,
             () if begins(&self.parts) || self.name.starts_with(word) => 16,
+            () if is(&self.elsewhere) => 12,
             () if begins(&self.section) => 8,
             () if is(&self.doc) => 6,
             () if begins(&self.doc) => 4,
@@ -126,6 +134,31 @@ mod tests {
         for b in table.iter() {
             let found = search(&table, &b.full_name()).entries;
             assert!(found.iter().take(2).any(|f| f.full_name() == b.full_name()), "{}", b.full_name());
+        }
+    }
+
+    #[test]
+    fn words_of_other_languages_are_known() {
+        for (words, name) in [
+            ("lpdf", "log_density"),
+            ("logp", "log_density"),
+            ("normal_lpdf", "log_density"),
+            ("target", "log_density"),
+            ("T[", "truncated"),
+            ("truncation", "truncated"),
+            ("cholesky_decompose", "cholesky"),
+            ("log_determinant", "logdet"),
+            ("mdivide", "solve"),
+            ("mdivide_left_spd", "solve"),
+            ("half line", "flat"),
+            ("positive_ordered", "ordered"),
+            ("jitter", "gp"),
+            ("recurrence", "fold"),
+            ("bernoulli", "flip"),
+            ("multi_normal_cholesky", "mv_normal"),
+        ] {
+            let found = names(words);
+            assert!(found.iter().take(2).any(|f| f == name), "{words}: {found:?}");
         }
     }
 

@@ -3,8 +3,8 @@
 //! Not a scope: shadowing by a program's own names is the business of lowering.
 
 use super::{
-    Builtin, Row, Text, covariance, data, distributions, forms, inference, interp, list, math, matrix, operators,
-    reduce, scene,
+    Builtin, Row, Text, covariance, data, definite, distributions, forms, inference, interp, list, log_density, math,
+    matrix, operators, reduce, scene,
 };
 use indexmap::{Equivalent, IndexMap};
 use rustc_hash::FxBuildHasher;
@@ -27,14 +27,16 @@ const CONSTANTS: &[Constant] = &[
 
 /// Those of the language, in the order of the reference.
 pub(super) fn all() -> impl Iterator<Item = Builtin> {
-    let own: [&[Row]; 11] = [
+    let own: [&[Row]; 13] = [
         operators::TABLE,
         math::TABLE,
         reduce::TABLE,
         list::TABLE,
         interp::TABLE,
         matrix::TABLE,
+        definite::TABLE,
         distributions::TABLE,
+        log_density::TABLE,
         covariance::TABLE,
         forms::TABLE,
         data::TABLE,

@@ -11,6 +11,10 @@ impl Rules<'_, '_> {
             Token::Bind => self.bind(),
             Token::EqEq if self.expects("=") => say("`==` compares", "write `=`", "a value is bound by `=`"),
             Token::Tilde => self.tilde(),
+            Token::LBracket if self.first() == Some(&Token::Let) && self.distance() == 2 => {
+                let name = self.text(self.context.at.saturating_sub(1));
+                say("`let` binds a name, not an element", "expected `=`", recurrence(name))
+            }
             Token::Colon => self.colon(),
             Token::Semi => self.semicolon(),
             Token::Hash => self.hash(),
@@ -44,7 +48,8 @@ impl Rules<'_, '_> {
                 format!("write `let {name} = …;` for a value, `{name} ~ …;` for a random choice; values do not change"),
             ),
             Token::Name(_) if self.expects("~") => {
-                say("values do not change", "", "`x[k] ~ d;` makes a random choice; an array is made by `map(f, xs)`")
+                let others = "`x[k] ~ d;` makes a random choice; an array is made by `map(f, xs)`";
+                say("values do not change", "", format!("{others}; {}", recurrence(name)))
             }
             Token::Fn if self.expects_block() => hint("the body of a function is in braces: `fn f(x) { x + 1 }`"),
             _ if self.expects_name_only() => None,
@@ -215,4 +220,11 @@ impl Rules<'_, '_> {
             ..Advice::default()
         })
     }
+}
+
+/// How elements that need the ones before them are written.
+fn recurrence(name: &str) -> String {
+    let i = if name == "t" { "i" } else { "t" };
+    let fold = format!("fold(fn(all, {i}) {{ append(all, f(all[{i} - 1])) }}, [first], 1 .. n)");
+    format!("`{name}[{i}] = f({name}[{i} - 1])` in a loop is `let {name} = {fold};`")
 }

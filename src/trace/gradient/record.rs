@@ -337,7 +337,12 @@ fn has_fixed_support(dist: &Dist, params: &[Form]) -> bool {
     match dist {
         d if !d.has_moving_support() => true,
         Dist::HalfCauchy(_) => params.first().is_some_and(Form::is_fixed),
-        Dist::TruncatedNormal(_) => params.iter().skip(2).all(Form::is_fixed),
+        // The bounds come last, also in `truncated(normal(m, s), lo, hi)`.
+        Dist::TruncatedNormal(_) => params.iter().rev().take(2).all(Form::is_fixed),
+        Dist::Truncated(d) => {
+            let (bounds, base) = (params.iter().rev().take(2).all(Form::is_fixed), params.first());
+            bounds && (base.is_some_and(Form::is_fixed) || !d.base().has_moving_support())
+        }
         Dist::Product(d) => d.parts().iter().all(|one| has_fixed_support(one, params)),
         _ => false,
     }

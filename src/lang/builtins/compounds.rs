@@ -1,0 +1,71 @@
+//! Distributions made of others, read from values.
+
+use super::Args;
+use super::distributions::{UNBOUNDED, fault};
+use super::elementwise::array_len;
+use crate::dist::{self, Dist};
+use crate::lang::error::Fault;
+use crate::lang::value::Value;
+use std::sync::Arc;
+
+/// An array of distributions.
+fn distributions(a: &Args, i: usize) -> Result<Vec<Dist>, Fault> {
+    let component = |v: &Value| match v {
+        Value::Dist(d) => Ok(Dist::clone(d)),
+        other => Err(a.element_wrong(i, "an array of distributions", other)),
+    };
+    a.elements(i)?.iter().map(component).collect()
+}
+
+/// So many numbers of one distribution, or one of each, in order.
+pub(super) fn ordered(a: &Args) -> Result<Dist, Fault> {
+    let made = match a.get(0) {
+        Value::Dist(d) if a.given(1) => dist::Ordered::new(Dist::clone(d), a.count(1)?),
+        Value::Dist(_) => {
+            let hint = "ordered(normal(0, 1), 3) is three numbers; unlike priors are listed: ordered([d1, d2])";
+            return Err(Fault::type_error("ordered: `n` says how many numbers of one distribution").with_hint(hint));
+        }
+        _ if a.given(1) => {
+            let hint = "leave `n` out: there is one number for each distribution of the array";
+            return Err(a.wrong(0, "one distribution where `n` is given").with_hint(hint));
+        }
+        Value::List(_) | Value::Array(_) => dist::Ordered::of(distributions(a, 0)?),
+        _ => return Err(a.wrong(0, "a distribution or an array of distributions")),
+    };
+    made.map(|d| Dist::Ordered(Arc::new(d))).map_err(fault)
+}
+
+/// A distribution between bounds, element by element where a bound is an array.
+pub(super) fn truncated(a: &Args) -> Result<Dist, Fault> {
+    let Value::Dist(d) = a.get(0) else { return Err(a.wrong(0, "a distribution")) };
+    let mut columns: [Option<Arc<[f64]>>; 2] = [None, None];
+    let mut bounds = UNBOUNDED;
+    for i in 0..2 {
+        match a.get(i + 1) {
+            Value::Unit => {}
+            Value::Num(x) => bounds[i] = *x,
+            v if array_len(v).is_some() => columns[i] = Some(a.array(i + 1)?),
+            _ => return Err(a.wrong(i + 1, "a number or an array of numbers")),
+        }
+    }
+    let Some(n) = columns.iter().flatten().map(|xs| xs.len()).next() else {
+        return dist::truncated(d, bounds[0], bounds[1]).map_err(fault);
+    };
+    let expected = d.elements().unwrap_or(n);
+    if let Some(i) = columns.iter().position(|c| c.as_ref().is_some_and(|xs| xs.len() != expected)) {
+        return Err(a.wrong_length(i + 1, &format!("as many elements as the rest, {expected}")));
+    }
+    let mut elements = Vec::with_capacity(n);
+    for k in 0..n {
+        let [lo, hi] = [0, 1].map(|i| columns[i].as_ref().map_or(bounds[i], |xs| xs[k]));
+        let made = dist::truncated(&d.element(k), lo, hi);
+        elements.push(made.map_err(|e| Fault::domain(format!("{e} (element {k})")))?);
+    }
+    dist::Product::new(elements).map(|d| Dist::Product(Arc::new(d))).map_err(fault)
+}
+
+/// One of several, by weights.
+pub(super) fn mixture(a: &Args) -> Result<Dist, Fault> {
+    let components = distributions(a, 1)?;
+    dist::Mixture::new(&a.array(0)?, components).map(|d| Dist::Mixture(Arc::new(d))).map_err(fault)
+}

@@ -1,0 +1,212 @@
+//! Symmetric positive definite matrices: Cholesky factors, linear systems, determinants, and their derivatives.
+//!
+//! Only the lower triangle is computed with. Derivatives by a matrix are symmetric: an entry off the diagonal shares them with its mirror
+//! image. Those of the factor are Murray's (2016, "Differentiation of the Cholesky decomposition", eq. 10).
+
+use super::elementwise::array;
+use super::matrix::Matrix;
+use super::reduce::dot;
+use super::{Arg, Args, Row, Type, arg, function};
+use crate::lang::adjoint::Adjoint;
+use crate::lang::error::Fault;
+use crate::lang::value::Value;
+use smallvec::smallvec;
+
+const SECTION: &str = "Matrices";
+
+/// How much an entry and its mirror image may differ, as a share of the largest entry.
+const ASYMMETRY: f64 = 1e-8;
+
+const M: Arg = arg("m", Type::Array, "A symmetric positive definite matrix, such as a covariance.");
+
+pub(super) const TABLE: &[Row] = &[
+    function(
+        "cholesky",
+        SECTION,
+        &[M],
+        Type::Array,
+        "The Cholesky factor L of `m = L L'`: lower triangular with a positive diagonal, as `mv_normal` takes it (`chol = L`).",
+        |a| Ok(Factor::read(a)?.into_value()),
+    )
+    .pull(|a, _, by| {
+        let l = Factor::read(a).ok()?;
+        let n = l.len();
+        let by: Vec<Vec<f64>> = (0..n).map(|i| by.element(i).numbers(n)).collect();
+        // P = tril(L' by), the diagonal halved; L'^-1 (P + P') L^-1 / 2.
+        let p = |i: usize, j: usize| {
+            let (i, j) = (i.max(j), i.min(j));
+            // L is lower triangular, and so is what counts of `by`.
+            (i..n).map(|k| l.0[k][i] * by[k][j]).sum::<f64>() * 0.5
+        };
+        let rows: Vec<Vec<f64>> = (0..n).map(|i| l.up(&(0..n).map(|j| p(i, j)).collect::<Vec<_>>())).collect();
+        // Row i of P L^-1 solves L' x = P_i; its columns again.
+        let columns: Vec<Vec<f64>> = (0..n).map(|j| l.up(&rows.iter().map(|r| r[j]).collect::<Vec<_>>())).collect();
+        Some(smallvec![symmetric(n, |i, j| columns[j][i])])
+    }),
+    function(
+        "solve",
+        SECTION,
+        &[M, arg("b", Type::Array, "A vector, or a matrix of as many rows as `m`.")],
+        Type::Array,
+        "The solution x of `matmul(m, x) = b`, for a symmetric positive definite `m`: `matmul(inverse of m, b)` without the inverse.",
+        |a| {
+            let l = Factor::read(a)?;
+            let columns = right_side(a, l.len())?;
+            let solved: Vec<Vec<f64>> = columns.iter().map(|b| l.solve(b)).collect();
+            Ok(match a.get(1) {
+                Value::Array(_) => Value::array(solved.into_iter().next().unwrap_or_default()),
+                _ => Value::List((0..l.len()).map(|i| array(solved.len(), |j| solved[j][i])).collect()),
+            })
+        },
+    )
+    .pull(|a, value, by| {
+        let l = Factor::read(a).ok()?;
+        let n = l.len();
+        let vector = matches!(value, Value::Array(_));
+        let width = if vector { 1 } else { value.element(0).and_then(|r| r.len()).unwrap_or(0) };
+        let column = |j: usize, v: &Value| -> Vec<f64> {
+            let numbers = |v: &Value| v.numbers();
+            match v {
+                Value::Array(xs) => xs.to_vec(),
+                v => (0..n).filter_map(|i| numbers(&v.element(i)?).get(j).copied()).collect(),
+            }
+        };
+        // By b it is m^-1 by, by m the negative of that times x'.
+        let by_b: Vec<Vec<f64>> = (0..width)
+            .map(|j| match vector {
+                true => l.solve(&by.numbers(n)),
+                false => l.solve(&(0..n).map(|i| by.element(i).element(j).number()).collect::<Vec<_>>()),
+            })
+            .collect();
+        let x: Vec<Vec<f64>> = (0..width).map(|j| column(j, value)).collect();
+        let by_m = symmetric(n, |i, j| -(0..width).map(|k| by_b[k][i] * x[k][j]).sum::<f64>());
+        let by_b = match vector {
+            true => Adjoint::Array(by_b.into_iter().next().unwrap_or_default()),
+            false => Adjoint::List((0..n).map(|i| Adjoint::Array(by_b.iter().map(|c| c[i]).collect())).collect()),
+        };
+        Some(smallvec![by_m, by_b])
+    }),
+    function(
+        "logdet",
+        SECTION,
+        &[M],
+        Type::Num,
+        "The logarithm of the determinant of a symmetric positive definite matrix.",
+        |a| {
+            let l = Factor::read(a)?;
+            Ok(Value::Num(2.0 * (0..l.len()).map(|i| libm::log(l.0[i][i])).sum::<f64>()))
+        },
+    )
+    .pull(|a, _, by| {
+        let l = Factor::read(a).ok()?;
+        let n = l.len();
+        let unit = |j: usize| (0..n).map(|i| f64::from(u8::from(i == j))).collect::<Vec<_>>();
+        let inverse: Vec<Vec<f64>> = (0..n).map(|j| l.solve(&unit(j))).collect();
+        let by = by.number();
+        Some(smallvec![symmetric(n, |i, j| by * inverse[j][i])])
+    }),
+];
+
+/// A Cholesky factor by rows, zeros included.
+struct Factor(Vec<Vec<f64>>);
+
+impl Factor {
+    /// That of the first argument.
+    fn read(a: &Args) -> Result<Factor, Fault> {
+        let m = Matrix::read(a, 0)?;
+        let (name, n) = (a.builtin.full_name(), m.rows.len());
+        if m.width != n {
+            let message = format!("{name}: `m` must be square, got {n} x {}", m.width);
+            return Err(Fault::type_error(message).with_hint("a covariance has a row and a column for each variable"));
+        }
+        let entries = m.rows.iter().flat_map(|r| r.iter());
+        let largest = entries.clone().fold(0.0, |most: f64, x| most.max(x.abs()));
+        if !entries.clone().all(|x| x.is_finite()) {
+            return Err(Fault::domain(format!("{name}: `m` must have finite entries")));
+        }
+        for i in 0..n {
+            for j in 0..i {
+                let (one, other) = (m.rows[i][j], m.rows[j][i]);
+                if (one - other).abs() > ASYMMETRY * largest {
+                    let message =
+                        format!("{name}: `m` must be symmetric, got {one} at [{i}][{j}] and {other} at [{j}][{i}]");
+                    return Err(Fault::type_error(message).with_hint("(m + transpose(m)) / 2 is symmetric"));
+                }
+            }
+        }
+        let mut l = vec![vec![0.0; n]; n];
+        for i in 0..n {
+            for j in 0..=i {
+                let rest = m.rows[i][j] - dot(&l[i][..j], &l[j][..j]);
+                if i != j {
+                    l[i][j] = rest / l[j][j];
+                } else if rest > 0.0 && rest.sqrt() > 0.0 {
+                    l[i][i] = rest.sqrt();
+                } else {
+                    let message =
+                        format!("{name}: `m` must be positive definite, its leading block of {} rows is not", i + 1);
+                    return Err(Fault::domain(message).with_hint(
+                        "a covariance needs positive variances and correlations within -1 to 1; a small number more on \
+                         the diagonal helps against rounding",
+                    ));
+                }
+            }
+        }
+        Ok(Factor(l))
+    }
+
+    fn len(&self) -> usize {
+        self.0.len()
+    }
+
+    /// The solution of L x = b.
+    fn down(&self, b: &[f64]) -> Vec<f64> {
+        let mut x = Vec::with_capacity(b.len());
+        for (i, row) in self.0.iter().enumerate() {
+            x.push((b[i] - dot(&row[..i], &x)) / row[i]);
+        }
+        x
+    }
+
+    /// The solution of L' x = b.
+    fn up(&self, b: &[f64]) -> Vec<f64> {
+        let mut x = b.to_vec();
+        for i in (0..self.len()).rev() {
+            x[i] /= self.0[i][i];
+            let own = x[i];
+            x[..i].iter_mut().zip(&self.0[i]).for_each(|(x, l)| *x -= own * l);
+        }
+        x
+    }
+
+    /// The solution of L L' x = b.
+    fn solve(&self, b: &[f64]) -> Vec<f64> {
+        self.up(&self.down(b))
+    }
+
+    fn into_value(self) -> Value {
+        Value::List(self.0.into_iter().map(Value::array).collect())
+    }
+}
+
+/// The mean of a matrix and its mirror image, as an adjoint.
+fn symmetric(n: usize, entry: impl Fn(usize, usize) -> f64) -> Adjoint {
+    let row = |i: usize| Adjoint::Array((0..n).map(|j| 0.5 * (entry(i, j) + entry(j, i))).collect());
+    Adjoint::List((0..n).map(row).collect())
+}
+
+/// The columns of the second argument, each with so many numbers.
+fn right_side(a: &Args, n: usize) -> Result<Vec<Vec<f64>>, Fault> {
+    let wrong = |rows: usize| {
+        Fault::type_error(format!("solve: `b` must have as many rows as `m`, {n}, got {rows}"))
+            .with_hint("it is the matrix that comes first: solve(m, b)")
+    };
+    if let Value::Array(b) = a.get(1) {
+        return if b.len() == n { Ok(vec![b.to_vec()]) } else { Err(wrong(b.len())) };
+    }
+    let b = Matrix::read(a, 1)?;
+    if b.rows.len() != n {
+        return Err(wrong(b.rows.len()));
+    }
+    Ok((0..b.width).map(|j| b.rows.iter().map(|r| r[j]).collect()).collect())
+}
