@@ -204,7 +204,7 @@ fn updates_agree(seed: u64) -> u64 {
         for step in 0..12 {
             let a = &addresses[rng.index(addresses.len())];
             let draws = Draws { key, step, lane: 1 + i };
-            let mut moved = |t: &mut Trace, keep: bool| {
+            let moved = |t: &mut Trace, keep: bool| {
                 let Some(target) = t.find(a) else { return "not there".to_owned() };
                 let said = match t.propose(&[(target, Change::Resample)], draws) {
                     Ok(w) => format!("{w:?}"),

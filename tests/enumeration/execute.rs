@@ -17,7 +17,7 @@ pub const POINT: f64 = 0.288_675_134_594_812_9;
 
 /// Where a point is.
 fn point(i: usize) -> f64 {
-    let away = if i % 2 == 0 { -POINT } else { POINT };
+    let away = if i.is_multiple_of(2) { -POINT } else { POINT };
     ((i / 2) as f64 + 0.5 + away) * WIDTH - REACH
 }
 

@@ -246,7 +246,7 @@ impl Generator {
             };
         }
         match self.rng.index(7) {
-            0 | 1 | 2 => {
+            0..=2 => {
                 let c = self.condition(2);
                 let (a, b) = (self.real(depth - 1), self.real(depth - 1));
                 Expr::If(boxed(c), boxed(a), boxed(b))

@@ -196,8 +196,8 @@ impl Display for Program {
                 Item::Effect(e) => writeln!(f, "{}", self.effect(e))?,
                 Item::Loop(n, defs, effects) => {
                     let mut inner = String::new();
-                    defs.iter().try_for_each(|d| write!(inner, "  {}\n", self.def(d, true, false)))?;
-                    effects.iter().try_for_each(|e| write!(inner, "  {}\n", self.effect(e)))?;
+                    defs.iter().try_for_each(|d| writeln!(inner, "  {}", self.def(d, true, false)))?;
+                    effects.iter().try_for_each(|e| writeln!(inner, "  {}", self.effect(e)))?;
                     writeln!(f, "for i in 0 .. {n} {{\n{inner}}}")?;
                 }
             }
