@@ -16,6 +16,8 @@ mod execute;
 mod gaussian;
 #[path = "enumeration/generate.rs"]
 mod generate;
+#[path = "enumeration/kernels.rs"]
+mod kernels;
 #[path = "enumeration/plans.rs"]
 mod plans;
 #[path = "enumeration/posterior.rs"]

@@ -9,6 +9,9 @@ macro_rules! with_mh {
     };
 }
 
+#[path = "../enumeration/kernels.rs"]
+pub mod random;
+
 /// Against exact answers (`tests/exact.rs`): statements, or several of them.
 pub mod exact {
     pub const CONJUGATE: &[&str] = &[
@@ -293,6 +296,12 @@ pub const PROOFS: &[Proof] = &[
         shows: "the same where choices appear, vanish, change form or are shared",
         file: "tests/balance.rs",
         statements: balance::CHANGING,
+    },
+    Proof {
+        name: "random programs",
+        shows: "from exact draws to exact draws, in random programs whose posteriors are enumerated",
+        file: "tests/enumeration.rs",
+        statements: random::ALL,
     },
     Proof {
         name: "by turns",

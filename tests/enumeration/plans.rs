@@ -1,5 +1,6 @@
 //! What is run on a program: every kernel, every grouping of what is summed out, the default plan, random mixes.
 
+use super::kernels::{ANY, CONTINUOUS, DISCRETE, REVERSIBLE, SUMMING};
 use super::posterior::Posterior;
 use super::program::{Def, Dist, Effect, Item, Program};
 use pcadlang::rng::Stream;
@@ -22,39 +23,6 @@ impl Plan {
         Plan { class: class.into(), statements: statements.into(), kernels: String::new() }
     }
 }
-
-/// Kernels for any choices.
-const ANY: &[&str] = &[
-    "mh(one(@**));",
-    "mh(each(@**));",
-    "block(@**);",
-    "block(one(@**));",
-    "drift(one(@**), 0.8);",
-    "drift(@**, 0.5);",
-    "drift(one(@**));",
-    "knn(@**, bank = \"b\");",
-    "knn(one(@**), bank = \"b\", k = 2);",
-    "temper(mh(one(@**)), levels = 3);",
-];
-const DISCRETE: &[&str] = &["gibbs(one($finite));", "gibbs(each($finite));"];
-const CONTINUOUS: &[&str] = &[
-    "slice(one($continuous));",
-    "slice($continuous, width = 0.3, doubling = true);",
-    "elliptical($gaussian);",
-    "elliptical(one($gaussian));",
-    "hmc($continuous, steps = 3);",
-    "mala($continuous);",
-    "nuts($continuous, max_depth = 4);",
-    "nuts(one($continuous), max_depth = 3);",
-];
-/// Kernels within `delayed`.
-const REVERSIBLE: &[&str] = &["mh(one(@**))", "gibbs(one($finite))", "block(@**)", "drift(one(@**), 0.7)"];
-/// Kernels that others can be summed out of.
-const SUMMING: &[&str] = &[
-    "hmc($continuous, steps = 2, marginal = %);",
-    "mala($continuous, marginal = %);",
-    "nuts($continuous, max_depth = 2, marginal = %);",
-];
 
 /// The most joint values that are summed out.
 const MOST_JOINT: usize = 24;
