@@ -86,9 +86,7 @@ fn run<T>(
     let sampler = PlanSampler { plan: &plan, options, progress: &progress };
     let said = std::thread::scope(|scope| {
         scope.spawn(|| progress::watch(&progress, &ending, None, false));
-        let said = method(model.code(), &sampler, &settings);
-        ending.end();
-        said
+        ending.of(|| method(model.code(), &sampler, &settings))
     });
     if progress.cancelled.load(Ordering::Relaxed) {
         return Err(Failure::Interrupted);

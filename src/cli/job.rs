@@ -291,9 +291,7 @@ fn fill(
         scope.spawn(|| progress::watch(&progress, &ending, options.time, !manner.live));
         scope.spawn(|| progress::ask_for_checkpoints(&progress, &ending, manner.checkpoint));
         scope.spawn(|| keep_best(dir, model, &best, &ending, manner.checkpoint));
-        let results = model.run_into(&options, threads(job), &progress, sinks);
-        ending.end();
-        results
+        ending.of(|| model.run_into(&options, threads(job), &progress, sinks))
     })?;
     let interrupted = progress.cancelled.load(Ordering::Relaxed);
     let sampled = begun.elapsed().as_secs_f64();

@@ -71,9 +71,7 @@ fn from_posterior(job: &Job, ready: &Ready) -> Result<Vec<Vec<Replication>>, Fai
     interrupt.ends(&progress);
     let results = std::thread::scope(|scope| {
         scope.spawn(|| progress::watch(&progress, &ending, s.time, false));
-        let results = model.run_into(&options, job::threads(job), &progress, sinks);
-        ending.end();
-        results
+        ending.of(|| model.run_into(&options, job::threads(job), &progress, sinks))
     })?;
     results.into_iter().collect::<Result<Vec<_>, _>>().map_err(|e| model.chain_error(e))?;
     if progress.cancelled.load(Ordering::Relaxed) {

@@ -19,10 +19,17 @@ pub struct Ending {
 }
 
 impl Ending {
-    /// It is there.
-    pub fn end(&self) {
-        *self.ended.lock().unwrap_or_else(PoisonError::into_inner) = true;
-        self.changed.notify_all();
+    /// Does what it is the end of. It comes even where that panics: who waits for it would keep the process.
+    pub fn of<T>(&self, work: impl FnOnce() -> T) -> T {
+        struct Comes<'a>(&'a Ending);
+        impl Drop for Comes<'_> {
+            fn drop(&mut self) {
+                *self.0.ended.lock().unwrap_or_else(PoisonError::into_inner) = true;
+                self.0.changed.notify_all();
+            }
+        }
+        let _comes = Comes(self);
+        work()
     }
 
     /// Waits for it, but not longer than this; whether it came.
@@ -107,6 +114,14 @@ fn whole(t: Duration) -> String {
 #[cfg(test)]
 mod tests {
     use super::*;
+
+    #[test]
+    fn the_end_comes_where_work_panics() {
+        let ending = Ending::default();
+        let work = std::panic::AssertUnwindSafe(|| ending.of(|| panic!("an internal error")));
+        assert!(std::panic::catch_unwind(work).is_err());
+        assert!(ending.within(Duration::ZERO));
+    }
 
     #[test]
     fn the_line_says_what_is_known() {

@@ -131,8 +131,7 @@ fn measure(
             let looks = times.iter().map_while(|&t| (!ending.within(ahead(t))).then(|| watched.look(Some(t))));
             looks.collect::<Vec<_>>()
         });
-        let results = ready.model.run_into(&options, threads as usize, &progress, sinks);
-        ending.end();
+        let results = ending.of(|| ready.model.run_into(&options, threads as usize, &progress, sinks));
         (results, looking.join().unwrap_or_default())
     });
     snapshots.push(watched.look(None));
