@@ -23,7 +23,10 @@ const LEFT_OUT: [&str; 4] = ["target", ".git", "mutants", "fuzz"];
 pub fn copy(from: &Path, to: &Path) -> Result<(), Failure> {
     std::fs::create_dir_all(to)?;
     for entry in std::fs::read_dir(from)? {
-        let (path, name) = { let e = entry?; (e.path(), e.file_name()) };
+        let (path, name) = {
+            let e = entry?;
+            (e.path(), e.file_name())
+        };
         if LEFT_OUT.iter().any(|l| name == *l) {
             continue;
         }

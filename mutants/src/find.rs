@@ -34,8 +34,14 @@ pub fn select(root: &Path, folders: &[&str], count: usize) -> Result<Vec<Mutant>
     }
     let total: usize = by_folder.iter().map(Vec::len).sum();
     let share = |n: usize| (count * n / total.max(1)).max(40);
-    let mut chosen: Vec<Mutant> =
-        by_folder.into_iter().flat_map(|all| { let n = share(all.len()); all.into_iter().take(n) }).map(|(_, m)| m).collect();
+    let mut chosen: Vec<Mutant> = by_folder
+        .into_iter()
+        .flat_map(|all| {
+            let n = share(all.len());
+            all.into_iter().take(n)
+        })
+        .map(|(_, m)| m)
+        .collect();
     chosen.sort_by(|a, b| (&a.file, a.range.start, &a.key).cmp(&(&b.file, b.range.start, &b.key)));
     Ok(chosen)
 }
@@ -65,7 +71,8 @@ fn files(folder: &Path) -> Result<Vec<PathBuf>, Failure> {
 fn of_file(root: &Path, file: &Path, into: &mut Vec<(u64, Mutant)>) -> Result<(), Failure> {
     let text = std::fs::read_to_string(file)?;
     let syntax = syn::parse_file(&text).map_err(|e| format!("{}: {e}", file.display()))?;
-    let mut finder = Finder { file, name: within(root, file), text: &text, function: String::new(), seen: HashMap::new(), into };
+    let mut finder =
+        Finder { file, name: within(root, file), text: &text, function: String::new(), seen: HashMap::new(), into };
     finder.visit_file(&syntax);
     Ok(())
 }
@@ -220,9 +227,11 @@ impl<'ast> Visit<'ast> for Finder<'_> {
 
     fn visit_expr_lit(&mut self, e: &'ast syn::ExprLit) {
         let new = match &e.lit {
-            Lit::Float(f) => f.base10_parse::<f64>().ok().map(|v| if v == 0.0 { 1.0 } else { 1.5 * v }).map(|v| {
-                format!("{v:?}{}", f.suffix())
-            }),
+            Lit::Float(f) => f
+                .base10_parse::<f64>()
+                .ok()
+                .map(|v| if v == 0.0 { 1.0 } else { 1.5 * v })
+                .map(|v| format!("{v:?}{}", f.suffix())),
             Lit::Int(i) => i.base10_parse::<u64>().ok().map(|v| format!("{}{}", v.wrapping_add(1), i.suffix())),
             Lit::Bool(b) => Some((!b.value).to_string()),
             _ => None,

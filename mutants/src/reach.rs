@@ -49,7 +49,12 @@ pub fn reached(copy: &Path, tests: &[TestProgram], mutants: usize) -> Result<Vec
                 }
             }
         }
-        println!("{}: {:.1} s, comes by {} mutants", test.name, takes.as_secs_f64(), r.any.iter().filter(|a| **a).count());
+        println!(
+            "{}: {:.1} s, comes by {} mutants",
+            test.name,
+            takes.as_secs_f64(),
+            r.any.iter().filter(|a| **a).count()
+        );
         all.push(r);
     }
     all.sort_by_key(|r| r.takes);
