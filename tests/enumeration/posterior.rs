@@ -49,6 +49,12 @@ impl Grid {
         top + total.ln()
     }
 
+    /// Whether it is over well within the grid on both sides; beyond, what a kernel does right would look wrong.
+    fn ends_within(&self) -> bool {
+        let margin = CELLS / 40;
+        self.sums[margin] < 1e-5 && self.sums[CELLS - margin] > 1.0 - 1e-5
+    }
+
     /// The point below which there is a share of the probability.
     fn quantile(&self, u: f64) -> f64 {
         let cell = self.sums.partition_point(|s| *s <= u).min(CELLS - 1);
@@ -110,7 +116,11 @@ impl Posterior {
         let most = p.kinds.iter().map(|k| k.log_total).fold(f64::NEG_INFINITY, f64::max);
         let total: f64 = p.kinds.iter().map(|k| (k.log_total - most).exp()).sum();
         p.kinds.iter_mut().for_each(|k| k.probability = (k.log_total - most).exp() / total);
-        most.is_finite().then_some(p)
+        let ends = |k: &Kind| match &k.continuous {
+            Continuous::Grid(_, grid) => k.log_total == f64::NEG_INFINITY || grid.ends_within(),
+            _ => true,
+        };
+        (most.is_finite() && p.kinds.iter().all(ends)).then_some(p)
     }
 
     fn enter(&mut self, e: Execution, integration: Integration) {
