@@ -15,6 +15,8 @@ pub struct Reached {
     pub tests: Vec<BTreeSet<String>>,
     /// By mutant: whether any thread did.
     pub any: Vec<bool>,
+    /// By mutant: whether a thread without a test's name did.
+    pub unnamed: Vec<bool>,
 }
 
 /// Runs all test programs that pass without a mutant, the quick ones first.
@@ -37,21 +39,23 @@ pub fn reached(copy: &Path, tests: &[TestProgram], mutants: usize) -> Result<Vec
             println!("{} fails without a mutant: left out", test.name);
             continue;
         }
-        let mut r =
-            Reached { test: test.clone(), takes, tests: vec![BTreeSet::new(); mutants], any: vec![false; mutants] };
+        let (test, tests) = (test.clone(), vec![BTreeSet::new(); mutants]);
+        let mut r = Reached { test, takes, tests, any: vec![false; mutants], unnamed: vec![false; mutants] };
         for file in std::fs::read_dir(&folder)? {
             for line in std::fs::read_to_string(file?.path())?.lines() {
                 let Some((id, name)) = line.split_once('\t') else { continue };
                 let Some(id) = id.parse::<usize>().ok().filter(|id| *id < mutants) else { continue };
                 r.any[id] = true;
-                if !name.is_empty() && name != "main" {
+                if name.is_empty() || name == "main" {
+                    r.unnamed[id] = true;
+                } else {
                     r.tests[id].insert(name.to_owned());
                 }
             }
         }
         println!(
             "{}: {:.1} s, comes by {} mutants",
-            test.name,
+            r.test.name,
             takes.as_secs_f64(),
             r.any.iter().filter(|a| **a).count()
         );

@@ -50,14 +50,15 @@ pub fn all(
     failed.into_inner().ok().flatten().map_or(Ok(()), Err)
 }
 
-/// What catches a mutant: single tests that come by it, then whole programs.
+/// What catches a mutant: single tests that come by it, then whole programs where others may.
 fn one(copy: &Path, id: usize, reached: &[Reached]) -> Result<Option<String>, Failure> {
-    for r in reached.iter().filter(|r| !r.tests[id].is_empty() && r.tests[id].len() <= SINGLE) {
+    let few = |r: &&Reached| r.tests[id].len() <= SINGLE;
+    for r in reached.iter().filter(|r| !r.tests[id].is_empty()).filter(few) {
         if let Some(by) = fails(copy, id, r, r.tests[id].iter().map(String::as_str).collect())? {
             return Ok(Some(by));
         }
     }
-    for r in reached.iter().filter(|r| r.any[id]) {
+    for r in reached.iter().filter(|r| r.any[id] && (r.unnamed[id] || !few(r))) {
         if let Some(by) = fails(copy, id, r, Vec::new())? {
             return Ok(Some(by));
         }

@@ -4,7 +4,7 @@ use nalgebra::DMatrix;
 
 /// A lower triangular matrix L with a positive diagonal; entry (i, j) at i (i + 1) / 2 + j.
 #[derive(Clone, Debug, PartialEq)]
-pub(super) struct Factor {
+pub(crate) struct Factor {
     n: usize,
     packed: Vec<f64>,
     log_diagonal: f64,
@@ -17,8 +17,11 @@ fn row(i: usize) -> usize {
 }
 
 impl Factor {
-    /// The factor of the symmetric matrix with this packed lower triangle; `None` if it is not positive definite.
-    pub fn new(n: usize, mut packed: Vec<f64>) -> Option<Factor> {
+    /// The factor of the symmetric matrix with this packed lower triangle.
+    ///
+    /// # Errors
+    /// If it is not positive definite: the number of rows of the least leading block that is not.
+    pub fn new(n: usize, mut packed: Vec<f64>) -> Result<Factor, usize> {
         debug_assert_eq!(packed.len(), row(n));
         for i in 0..n {
             let (above, rest) = packed.split_at_mut(row(i));
@@ -30,11 +33,11 @@ impl Factor {
             }
             let pivot = this[i] - dot(&this[..i], &this[..i]);
             if !(pivot > 0.0 && pivot.is_finite()) {
-                return None;
+                return Err(i + 1);
             }
             this[i] = pivot.sqrt();
         }
-        Factor::with_sum(n, packed)
+        Ok(Factor::with_sum(n, packed))
     }
 
     /// A matrix that is already a factor; `None` unless it is square and finite with a positive diagonal. What is above the
@@ -43,16 +46,21 @@ impl Factor {
         let packed = lower(m)?;
         let n = m.nrows();
         let good = packed.iter().all(|x| x.is_finite()) && (0..n).all(|i| packed[row(i) + i] > 0.0);
-        if good { Factor::with_sum(n, packed) } else { None }
+        good.then(|| Factor::with_sum(n, packed))
     }
 
-    fn with_sum(n: usize, packed: Vec<f64>) -> Option<Factor> {
+    fn with_sum(n: usize, packed: Vec<f64>) -> Factor {
         let log_diagonal = (0..n).map(|i| libm::log(packed[row(i) + i])).sum();
-        Some(Factor { n, packed, log_diagonal })
+        Factor { n, packed, log_diagonal }
     }
 
     pub fn size(&self) -> usize {
         self.n
+    }
+
+    /// Row i, up to the diagonal.
+    pub fn row(&self, i: usize) -> &[f64] {
+        &self.packed[row(i)..=row(i) + i]
     }
 
     /// Entry (i, i).
@@ -108,6 +116,11 @@ impl Factor {
             z.push((x[i] - mean[i] - dot(&this[..i], &z)) / this[i]);
         }
         z
+    }
+
+    /// (L L')^-1 b.
+    pub fn solve(&self, b: &[f64]) -> Vec<f64> {
+        self.solve_transposed(self.whiten(&vec![0.0; self.n], b))
     }
 
     /// L^-T z.

@@ -55,7 +55,7 @@ impl Gp {
             let value = format!("{cov} at {} points", at.len());
             ParamError::new("gp", "cov", value, "must make a positive definite matrix")
         };
-        let factor = Factor::new(at.len(), packed).ok_or_else(singular)?;
+        let factor = Factor::new(at.len(), packed).map_err(|_| singular())?;
         Ok(Gp(Gaussian { mean: mean.into(), factor, whitened: !centred }, jitter))
     }
 

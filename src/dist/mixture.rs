@@ -1,5 +1,6 @@
 //! Mixtures: a value of one of several distributions, it is not known which.
 
+use super::interval::ends;
 use super::{Categorical, Datum, Dist, Distribution, Gradient, ParamError, Scalar, Support};
 use crate::num::log_sum_exp;
 use crate::rng::Stream;
@@ -106,15 +107,11 @@ fn plain(s: Support) -> Support {
 
 /// The bounds of an interval of numbers.
 fn bounds(s: &Support) -> Option<(f64, f64)> {
-    Some(match s {
-        Support::Real => (f64::NEG_INFINITY, f64::INFINITY),
-        Support::Positive => (0.0, f64::INFINITY),
-        Support::AtLeast { lo } => (*lo, f64::INFINITY),
-        Support::AtMost { hi } => (f64::NEG_INFINITY, *hi),
-        Support::Interval { lo, hi } => (*lo, *hi),
-        Support::Circle => (-core::f64::consts::PI, core::f64::consts::PI),
-        _ => return None,
-    })
+    match s {
+        Support::Circle => Some((-core::f64::consts::PI, core::f64::consts::PI)),
+        Support::Integers { .. } => None,
+        s => ends(s),
+    }
 }
 
 /// The least space around two; `None` if their values are of different kinds.

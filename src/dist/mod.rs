@@ -69,6 +69,7 @@ pub use dirichlet::Dirichlet;
 pub use dist::Dist;
 pub use distribution::{Distribution, Gradient};
 pub use exponential::Exponential;
+pub(crate) use factor::Factor;
 pub use families::{FAMILIES, Family, ParamDoc};
 pub use flat::Flat;
 pub use flip::Flip;

@@ -29,7 +29,7 @@ impl MvNormal {
             return Err(ParamError::new("mv_normal", "cov", "one that is not", "must be symmetric"));
         }
         let definite = || ParamError::new("mv_normal", "cov", "one that is not", "must be positive definite");
-        Self::make(mean, Factor::new(n, packed).ok_or_else(definite)?)
+        Self::make(mean, Factor::new(n, packed).map_err(|_| definite())?)
     }
 
     /// With this mean and the lower triangular Cholesky factor of the covariance; fails unless the mean is finite and the factor

@@ -132,14 +132,16 @@ impl Truncated {
     /// The logarithm of the probability that `d` gives to the values up to `x`.
     fn log_mass_to(&self, x: f64) -> Option<f64> {
         let (a, b) = self.ends_to(x);
-        match &self.base {
-            // Its density bends at the centre.
-            Dist::Laplace(d) if d.number_mean().is_some_and(|centre| a < centre && centre < b) => {
-                let centre = d.number_mean()?;
-                Some(log_sum_exp(&[self.log_between(a, centre)?, self.log_between(centre, b)?]).min(0.0))
-            }
-            _ => self.log_between(a, b),
+        match self.bend(a, b) {
+            Some(at) => Some(log_sum_exp(&[self.log_between(a, at)?, self.log_between(at, b)?]).min(0.0)),
+            None => self.log_between(a, b),
         }
+    }
+
+    /// Where the density bends between two numbers: at the centre of `laplace`.
+    fn bend(&self, a: f64, b: f64) -> Option<f64> {
+        let Dist::Laplace(d) = &self.base else { return None };
+        d.number_mean().filter(|centre| a < *centre && *centre < b)
     }
 
     /// That it gives to the values above `a`, up to `b`.
@@ -199,8 +201,11 @@ impl Truncated {
             }
             return Some(sum);
         }
-        let bent = matches!(&self.base, Dist::Laplace(d) if d.number_mean().is_some_and(|c| a < c && c < b));
-        if !bent && !self.is_end_of_base(a) && !self.is_end_of_base(b) && self.narrow(a, b).is_some() {
+        if self.bend(a, b).is_none()
+            && !self.is_end_of_base(a)
+            && !self.is_end_of_base(b)
+            && self.narrow(a, b).is_some()
+        {
             each_node(a, b, |x, w| add(x, w * libm::exp(self.base.log_density_num(x) - self.log_mass)));
             return Some(sum);
         }

@@ -1,7 +1,9 @@
 //! What kernels remember, as bytes of a checkpoint.
 
+use rustc_hash::FxHashMap;
 use serde::Serialize;
 use serde::de::DeserializeOwned;
+use std::collections::BTreeMap;
 
 /// Bytes that are not what a kernel, or a chain, wrote.
 #[derive(Clone, Debug, PartialEq, Eq, thiserror::Error)]
@@ -13,6 +15,11 @@ impl StateError {
     pub fn new(message: impl Into<String>) -> Self {
         StateError(message.into())
     }
+}
+
+/// Entries by key, so that equal states are equal bytes.
+pub(crate) fn in_order<K: Ord + Copy, T>(map: &FxHashMap<K, T>) -> BTreeMap<K, &T> {
+    map.iter().map(|(key, value)| (*key, value)).collect()
 }
 
 /// A value as bytes (CBOR, RFC 8949: exact for all numbers, and its reader bounds how deep it goes).

@@ -80,10 +80,12 @@ impl Code {
                 self.ops.push(op);
             }
             let (ops, slots) = (&self.ops[block.first as usize..], &self.slots[block.first as usize..]);
+            let asked = super::spread::always_asked(ops, slots);
             let found: Vec<_> = (0..slots.len() as Slot)
                 .filter(|s| matches!(ops[*s as usize], Op::Draw { .. } | Op::Index { .. }))
                 .map(|s| {
-                    let spread = if slots[s as usize].is_draw { super::spread::spread(ops, slots, s) } else { None };
+                    let spread =
+                        if slots[s as usize].is_draw { super::spread::spread(ops, slots, &asked, s) } else { None };
                     (s, spread, Formula::new(ops, slots, s, &self.builtins).map(Box::new))
                 })
                 .collect();

@@ -10,15 +10,14 @@ use smallvec::SmallVec;
 /// The longest list worth keeping; a bit each in [`Spread::conditional`].
 const LONGEST: usize = u64::BITS as usize;
 
-/// The spread of the choice in slot `from` of a block, if it is the same in every state.
-pub(super) fn spread(ops: &[Op], slots: &[SlotFacts], from: Slot) -> Option<Spread> {
+/// The spread of the choice in slot `from` of a block, if it is the same in every state. `asked` are the slots that are always asked for.
+pub(super) fn spread(ops: &[Op], slots: &[SlotFacts], asked: &[bool], from: Slot) -> Option<Spread> {
     let order = dependents(ops, slots, from)?;
     // A keyed choice may turn into another one.
     if order.iter().any(|s| matches!(&ops[*s as usize], Op::Draw { keys, .. } if !keys.is_empty())) {
         return None;
     }
     let is_closed = reads_inside(ops, from, &order);
-    let asked = always_asked(ops, slots);
     let bits = order.iter().enumerate().filter(|(_, s)| !asked[**s as usize]);
     let conditional = bits.fold(0, |all, (i, _)| all | 1 << i);
     let decides = |o: &Operand| matches!(o, Operand::Local(s) if *s == from || order.contains(s));
@@ -27,7 +26,7 @@ pub(super) fn spread(ops: &[Op], slots: &[SlotFacts], from: Slot) -> Option<Spre
 }
 
 /// Which slots effects of their block ask for whatever conditions say.
-fn always_asked(ops: &[Op], slots: &[SlotFacts]) -> Vec<bool> {
+pub(super) fn always_asked(ops: &[Op], slots: &[SlotFacts]) -> Vec<bool> {
     let mut asked: Vec<bool> = slots.iter().map(|s| s.is_effect).collect();
     let mut open: Vec<usize> = (0..slots.len()).filter(|s| asked[*s]).collect();
     while let Some(slot) = open.pop() {

@@ -3,7 +3,7 @@
 use super::special::ln_gamma;
 
 /// Terms of the series and of the continued fraction before they are taken as they are.
-const TERMS: usize = 500;
+const TERMS: u32 = 500;
 
 /// The regularised upper incomplete gamma function Q(a, x) for a > 0, x >= 0: by the power series below a + 1 (DLMF 8.7.1), by
 /// Legendre's continued fraction above (DLMF 8.9.2, evaluated after Lentz). NaN outside.
@@ -21,7 +21,7 @@ pub fn upper_gamma(a: f64, x: f64) -> f64 {
     if x < a + 1.0 {
         let (mut term, mut sum) = (1.0 / a, 1.0 / a);
         for n in 1..TERMS {
-            term *= x / (a + n as f64);
+            term *= x / (a + f64::from(n));
             sum += term;
             if term < sum * f64::EPSILON {
                 break;
@@ -29,11 +29,16 @@ pub fn upper_gamma(a: f64, x: f64) -> f64 {
         }
         return (1.0 - scale * sum).clamp(0.0, 1.0);
     }
+    (scale * upper_fraction(a, x, TERMS)).clamp(0.0, 1.0)
+}
+
+/// Legendre's continued fraction for Gamma(a, x) over x^a e^-x (DLMF 8.9.2), evaluated after Lentz up to so many terms.
+pub(super) fn upper_fraction(a: f64, x: f64, terms: u32) -> f64 {
     let mut b = x + 1.0 - a;
     let (mut c, mut d) = (1.0 / TINY, 1.0 / b);
     let mut h = d;
-    for n in 1..TERMS {
-        let n = n as f64;
+    for n in 1..terms {
+        let n = f64::from(n);
         let an = -n * (n - a);
         b += 2.0;
         d = 1.0 / not_zero(an * d + b);
@@ -44,13 +49,13 @@ pub fn upper_gamma(a: f64, x: f64) -> f64 {
             break;
         }
     }
-    (scale * h).clamp(0.0, 1.0)
+    h
 }
 
 /// Stands in for zero in Lentz's method.
 const TINY: f64 = 1e-300;
 
-fn not_zero(x: f64) -> f64 {
+pub(super) fn not_zero(x: f64) -> f64 {
     if x.abs() < TINY { TINY } else { x }
 }
 

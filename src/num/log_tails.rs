@@ -1,17 +1,11 @@
 //! The incomplete gamma and beta functions, both sides of each in logarithms, so that neither underflows.
 
+use super::incomplete::{not_zero, upper_fraction};
 use super::saddle::{deviance, stirling_error};
 use super::special::{LN_SQRT_2PI, ln_beta, ln_gamma, log_diff_exp};
 
 /// The largest parameter: the number of terms grows as its square root.
 const LARGEST: f64 = 1e8;
-
-/// Stands in for zero in Lentz's method.
-const TINY: f64 = 1e-300;
-
-fn not_zero(x: f64) -> f64 {
-    if x.abs() < TINY { TINY } else { x }
-}
 
 /// Terms before a sum is taken as it is.
 fn terms(a: f64) -> u32 {
@@ -47,22 +41,7 @@ pub fn gamma_tails(a: f64, x: f64) -> Option<(f64, f64)> {
         let below = (scale + libm::log(sum)).min(0.0);
         return Some((below, log_diff_exp(0.0, below)));
     }
-    let mut b = x + 1.0 - a;
-    let (mut c, mut d) = (1.0 / TINY, 1.0 / b);
-    let mut h = d;
-    for n in 1..terms(a) {
-        let n = f64::from(n);
-        let an = -n * (n - a);
-        b += 2.0;
-        d = 1.0 / not_zero(an * d + b);
-        c = not_zero(b + an / c);
-        let step = d * c;
-        h *= step;
-        if (step - 1.0).abs() < f64::EPSILON {
-            break;
-        }
-    }
-    let above = (scale + libm::log(a) + libm::log(h)).min(0.0);
+    let above = (scale + libm::log(a) + libm::log(upper_fraction(a, x, terms(a)))).min(0.0);
     Some((log_diff_exp(0.0, above), above))
 }
 

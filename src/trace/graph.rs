@@ -36,8 +36,9 @@ pub(crate) struct Graph {
     pub version: u32,
     /// Counts the updates that were kept.
     pub revision: u64,
-    /// Nodes being evaluated, and those that were when an evaluation failed.
+    /// Nodes being evaluated.
     pub stack: Vec<NodeId>,
+    /// Those that were when an evaluation failed.
     pub failed: Vec<NodeId>,
     /// Effects of new frames, to be run.
     pub effects: Vec<NodeId>,

@@ -8,13 +8,12 @@
 use super::shape::{MOST, Shape};
 use crate::dist::{Datum, Support};
 use crate::infer::kernel::{At, Kernel, Outcome, Pick, Registered, Scope, recoverable, settle};
-use crate::infer::state::{StateError, holds, pack, unpack};
+use crate::infer::state::{StateError, holds, in_order, pack, unpack};
 use crate::lang::key::mix;
 use crate::rng::Stream;
 use crate::trace::{Change, Target, Trace, TraceResult};
 use rustc_hash::FxHashMap;
 use serde::{Deserialize, Serialize};
-use std::collections::BTreeMap;
 
 /// The acceptance rates aimed at in one dimension and in many (Roberts & Rosenthal 2001).
 const ONE_D: f64 = 0.44;
@@ -253,11 +252,6 @@ impl Kernel for Drift {
         }
         Ok(outcome)
     }
-}
-
-/// Entries by key, so that equal states are equal bytes.
-fn in_order<T>(map: &FxHashMap<u64, T>) -> BTreeMap<u64, &T> {
-    map.iter().map(|(key, value)| (*key, value)).collect()
 }
 
 /// What tells the shapes of different sets of choices apart.

@@ -5,7 +5,7 @@
 //! vanish, counts as outside the slice, so the kernel moves within the present structure.
 
 use crate::infer::kernel::{At, Kernel, Outcome, Registered, Scope, recoverable};
-use crate::infer::state::{StateError, pack, unpack};
+use crate::infer::state::{StateError, in_order, pack, unpack};
 use crate::rng::Stream;
 use crate::trace::{Change, Target, Trace, TraceResult};
 use rustc_hash::FxHashMap;
@@ -165,10 +165,7 @@ impl Kernel for Slice {
     }
 
     fn save(&self, _: &Trace) -> Vec<u8> {
-        // In order: equal states are equal bytes.
-        let mut learnt: Vec<_> = self.learnt.iter().collect();
-        learnt.sort_unstable_by_key(|(key, _)| **key);
-        pack(&learnt)
+        pack(&in_order(&self.learnt).into_iter().collect::<Vec<_>>())
     }
 
     fn load(&mut self, state: &[u8]) -> Result<(), StateError> {

@@ -1,12 +1,12 @@
 //! Symmetric positive definite matrices: Cholesky factors, linear systems, determinants, and their derivatives.
 //!
 //! Only the lower triangle is computed with. Derivatives by a matrix are symmetric: an entry off the diagonal shares them with its mirror
-//! image. Those of the factor are Murray's (2016, "Differentiation of the Cholesky decomposition", eq. 10).
+//! image.
 
 use super::elementwise::array;
 use super::matrix::Matrix;
-use super::reduce::dot;
 use super::{Arg, Args, Row, Type, arg, function};
+use crate::dist::Factor;
 use crate::lang::adjoint::Adjoint;
 use crate::lang::error::Fault;
 use crate::lang::value::Value;
@@ -26,22 +26,20 @@ pub(super) const TABLE: &[Row] = &[
         &[M],
         Type::Array,
         "The Cholesky factor L of `m = L L'`: lower triangular with a positive diagonal, as `mv_normal` takes it (`chol = L`).",
-        |a| Ok(Factor::read(a)?.into_value()),
+        |a| {
+            let l = read(a)?;
+            let n = l.size();
+            Ok(Value::List((0..n).map(|i| array(n, |j| l.row(i).get(j).copied().unwrap_or(0.0))).collect()))
+        },
     )
     .pull(|a, _, by| {
-        let l = Factor::read(a).ok()?;
-        let n = l.len();
-        let by: Vec<Vec<f64>> = (0..n).map(|i| by.element(i).numbers(n)).collect();
-        // P = tril(L' by), the diagonal halved; L'^-1 (P + P') L^-1 / 2.
-        let p = |i: usize, j: usize| {
-            let (i, j) = (i.max(j), i.min(j));
-            // L is lower triangular, and so is what counts of `by`.
-            (i..n).map(|k| l.0[k][i] * by[k][j]).sum::<f64>() * 0.5
-        };
-        let rows: Vec<Vec<f64>> = (0..n).map(|i| l.up(&(0..n).map(|j| p(i, j)).collect::<Vec<_>>())).collect();
-        // Row i of P L^-1 solves L' x = P_i; its columns again.
-        let columns: Vec<Vec<f64>> = (0..n).map(|j| l.up(&rows.iter().map(|r| r[j]).collect::<Vec<_>>())).collect();
-        Some(smallvec![symmetric(n, |i, j| columns[j][i])])
+        let l = read(a).ok()?;
+        let n = l.size();
+        let by: Vec<f64> = (0..n).flat_map(|i| by.element(i).numbers(n).into_iter().take(i + 1)).collect();
+        let by = l.pull_cholesky(&by);
+        // What lies off the diagonal stands for both of its places.
+        let entry = |i: usize, j: usize| if i == j { by[packed(i, i)] } else { 0.5 * by[packed(i.max(j), i.min(j))] };
+        Some(smallvec![symmetric(n, entry)])
     }),
     function(
         "solve",
@@ -50,18 +48,18 @@ pub(super) const TABLE: &[Row] = &[
         Type::Array,
         "The solution x of `matmul(m, x) = b`, for a symmetric positive definite `m`: `matmul(inverse of m, b)` without the inverse.",
         |a| {
-            let l = Factor::read(a)?;
-            let columns = right_side(a, l.len())?;
+            let l = read(a)?;
+            let columns = right_side(a, l.size())?;
             let solved: Vec<Vec<f64>> = columns.iter().map(|b| l.solve(b)).collect();
             Ok(match a.get(1) {
                 Value::Array(_) => Value::array(solved.into_iter().next().unwrap_or_default()),
-                _ => Value::List((0..l.len()).map(|i| array(solved.len(), |j| solved[j][i])).collect()),
+                _ => Value::List((0..l.size()).map(|i| array(solved.len(), |j| solved[j][i])).collect()),
             })
         },
     )
     .pull(|a, value, by| {
-        let l = Factor::read(a).ok()?;
-        let n = l.len();
+        let l = read(a).ok()?;
+        let n = l.size();
         let vector = matches!(value, Value::Array(_));
         let width = if vector { 1 } else { value.element(0).and_then(|r| r.len()).unwrap_or(0) };
         let column = |j: usize, v: &Value| -> Vec<f64> {
@@ -93,13 +91,13 @@ pub(super) const TABLE: &[Row] = &[
         Type::Num,
         "The logarithm of the determinant of a symmetric positive definite matrix.",
         |a| {
-            let l = Factor::read(a)?;
-            Ok(Value::Num(2.0 * (0..l.len()).map(|i| libm::log(l.0[i][i])).sum::<f64>()))
+            let l = read(a)?;
+            Ok(Value::Num(2.0 * l.log_det()))
         },
     )
     .pull(|a, _, by| {
-        let l = Factor::read(a).ok()?;
-        let n = l.len();
+        let l = read(a).ok()?;
+        let n = l.size();
         let unit = |j: usize| (0..n).map(|i| f64::from(u8::from(i == j))).collect::<Vec<_>>();
         let inverse: Vec<Vec<f64>> = (0..n).map(|j| l.solve(&unit(j))).collect();
         let by = by.number();
@@ -107,86 +105,42 @@ pub(super) const TABLE: &[Row] = &[
     }),
 ];
 
-/// A Cholesky factor by rows, zeros included.
-struct Factor(Vec<Vec<f64>>);
+/// Where an entry of the lower triangle is among those packed by rows.
+fn packed(i: usize, j: usize) -> usize {
+    i * (i + 1) / 2 + j
+}
 
-impl Factor {
-    /// That of the first argument.
-    fn read(a: &Args) -> Result<Factor, Fault> {
-        let m = Matrix::read(a, 0)?;
-        let (name, n) = (a.builtin.full_name(), m.rows.len());
-        if m.width != n {
-            let message = format!("{name}: `m` must be square, got {n} x {}", m.width);
-            return Err(Fault::type_error(message).with_hint("a covariance has a row and a column for each variable"));
-        }
-        let entries = m.rows.iter().flat_map(|r| r.iter());
-        let largest = entries.clone().fold(0.0, |most: f64, x| most.max(x.abs()));
-        if !entries.clone().all(|x| x.is_finite()) {
-            return Err(Fault::domain(format!("{name}: `m` must have finite entries")));
-        }
-        for i in 0..n {
-            for j in 0..i {
-                let (one, other) = (m.rows[i][j], m.rows[j][i]);
-                if (one - other).abs() > ASYMMETRY * largest {
-                    let message =
-                        format!("{name}: `m` must be symmetric, got {one} at [{i}][{j}] and {other} at [{j}][{i}]");
-                    return Err(Fault::type_error(message).with_hint("(m + transpose(m)) / 2 is symmetric"));
-                }
+/// The Cholesky factor of the first argument.
+fn read(a: &Args) -> Result<Factor, Fault> {
+    let m = Matrix::read(a, 0)?;
+    let (name, n) = (a.builtin.full_name(), m.rows.len());
+    if m.width != n {
+        let message = format!("{name}: `m` must be square, got {n} x {}", m.width);
+        return Err(Fault::type_error(message).with_hint("a covariance has a row and a column for each variable"));
+    }
+    let entries = m.rows.iter().flat_map(|r| r.iter());
+    let largest = entries.clone().fold(0.0, |most: f64, x| most.max(x.abs()));
+    if !entries.clone().all(|x| x.is_finite()) {
+        return Err(Fault::domain(format!("{name}: `m` must have finite entries")));
+    }
+    for i in 0..n {
+        for j in 0..i {
+            let (one, other) = (m.rows[i][j], m.rows[j][i]);
+            if (one - other).abs() > ASYMMETRY * largest {
+                let message =
+                    format!("{name}: `m` must be symmetric, got {one} at [{i}][{j}] and {other} at [{j}][{i}]");
+                return Err(Fault::type_error(message).with_hint("(m + transpose(m)) / 2 is symmetric"));
             }
         }
-        let mut l = vec![vec![0.0; n]; n];
-        for i in 0..n {
-            for j in 0..=i {
-                let rest = m.rows[i][j] - dot(&l[i][..j], &l[j][..j]);
-                if i != j {
-                    l[i][j] = rest / l[j][j];
-                } else if rest > 0.0 && rest.sqrt() > 0.0 {
-                    l[i][i] = rest.sqrt();
-                } else {
-                    let message =
-                        format!("{name}: `m` must be positive definite, its leading block of {} rows is not", i + 1);
-                    return Err(Fault::domain(message).with_hint(
-                        "a covariance needs positive variances and correlations within -1 to 1; a small number more on \
-                         the diagonal helps against rounding",
-                    ));
-                }
-            }
-        }
-        Ok(Factor(l))
     }
-
-    fn len(&self) -> usize {
-        self.0.len()
-    }
-
-    /// The solution of L x = b.
-    fn down(&self, b: &[f64]) -> Vec<f64> {
-        let mut x = Vec::with_capacity(b.len());
-        for (i, row) in self.0.iter().enumerate() {
-            x.push((b[i] - dot(&row[..i], &x)) / row[i]);
-        }
-        x
-    }
-
-    /// The solution of L' x = b.
-    fn up(&self, b: &[f64]) -> Vec<f64> {
-        let mut x = b.to_vec();
-        for i in (0..self.len()).rev() {
-            x[i] /= self.0[i][i];
-            let own = x[i];
-            x[..i].iter_mut().zip(&self.0[i]).for_each(|(x, l)| *x -= own * l);
-        }
-        x
-    }
-
-    /// The solution of L L' x = b.
-    fn solve(&self, b: &[f64]) -> Vec<f64> {
-        self.up(&self.down(b))
-    }
-
-    fn into_value(self) -> Value {
-        Value::List(self.0.into_iter().map(Value::array).collect())
-    }
+    let lower = m.rows.iter().enumerate().flat_map(|(i, r)| r[..=i].iter().copied()).collect();
+    Factor::new(n, lower).map_err(|rows| {
+        let message = format!("{name}: `m` must be positive definite, its leading block of {rows} rows is not");
+        Fault::domain(message).with_hint(
+            "a covariance needs positive variances and correlations within -1 to 1; a small number more on the diagonal \
+             helps against rounding",
+        )
+    })
 }
 
 /// The mean of a matrix and its mirror image, as an adjoint.

@@ -22,6 +22,8 @@ pub(super) struct Summed {
     start: Vec<(Target, Change)>,
     begun: Option<View>,
     origin: f64,
+    /// What was seen last, and where.
+    last: Option<(Vec<f64>, View)>,
 }
 
 /// A place with all choices that are summed out at each of their values.
@@ -54,7 +56,7 @@ impl System<'_> {
     pub(super) fn sum_out(&mut self, marginal: Marginal, point: &mut Point) -> TraceResult<bool> {
         let here = |t: &Target| Some((*t, Change::Set(self.trace.stored(*t)?)));
         let start = self.layout.targets.iter().filter_map(here).collect();
-        self.summed = Some(Summed { marginal, start, begun: None, origin: 0.0 });
+        self.summed = Some(Summed { marginal, start, begun: None, origin: 0.0, last: None });
         let begun = self.evaluate_summed(point)?;
         self.trace.rollback();
         let there = begun.is_some();
@@ -163,7 +165,12 @@ impl System<'_> {
 
     /// Whether there is a density and a slope at a place, which are filled in.
     pub(super) fn goes_summed(&mut self, point: &mut Point) -> TraceResult<bool> {
-        Ok(self.evaluate_summed(point)?.is_some())
+        let view = self.evaluate_summed(point)?;
+        let there = view.is_some();
+        if let Some(summed) = &mut self.summed {
+            summed.last = view.map(|v| (point.y.clone(), v));
+        }
+        Ok(there)
     }
 
     /// Makes a place, or the one it began in, the state of the trace, with the choices drawn from their conditional there.
@@ -174,10 +181,11 @@ impl System<'_> {
             (None, Some(summed)) => std::mem::take(&mut summed.start),
             (None, None) => return Ok(false),
         };
-        let begun = self.summed.as_mut().and_then(|s| s.begun.take());
-        let view = match to {
-            Some(_) => self.view(&at)?,
-            None => begun,
+        let (begun, last) = self.summed.as_mut().map_or((None, None), |s| (s.begun.take(), s.last.take()));
+        let view = match (to, last) {
+            (None, _) => begun,
+            (Some(p), Some((y, view))) if bits(&y).eq(bits(&p.y)) => Some(view),
+            _ => self.view(&at)?,
         };
         let Some(view) = view else {
             self.trace.rollback();
@@ -192,6 +200,10 @@ impl System<'_> {
         }
         Ok(there && to.is_some())
     }
+}
+
+fn bits(y: &[f64]) -> impl Iterator<Item = u64> {
+    y.iter().map(|x| x.to_bits())
 }
 
 /// A value drawn with these log probabilities.
