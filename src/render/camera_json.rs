@@ -131,6 +131,17 @@ mod tests {
     }
 
     #[test]
+    fn pictures_have_at_most_so_many_pixels_a_side() {
+        let sized = |side: &str| Camera::from_json(&GOOD.replace("256, 200", side));
+        for side in ["16384, 1", "1, 16384"] {
+            assert!(sized(side).is_ok(), "{side}");
+        }
+        for side in ["16385, 1", "1, 16385", "0, 1", "1.5, 1"] {
+            assert!(sized(side).is_err(), "{side}");
+        }
+    }
+
+    #[test]
     fn an_orthographic_camera_needs_no_position() {
         let text = r#"{"model": "orthographic", "looks_along": [0, 0, -2], "up": [0, 1, 1], "image": [192, 256],
             "units_per_pixel": 0.0171875}"#;

@@ -103,6 +103,23 @@ mod tests {
     }
 
     #[test]
+    fn weak_edges_are_kept_where_they_go_on_from_strong_ones() {
+        // The disc fades into its ground along its rim.
+        let n = 256;
+        let faint = RgbImage::from_fn(n, n, |i, j| {
+            let (x, y) = (i as f32 + 0.5 - 128.0, j as f32 + 0.5 - 128.0);
+            let contrast = 90.0 * (0.5 + 0.5 * (y.atan2(x)).cos());
+            Rgb([if x.hypot(y) < 80.0 { 90 + contrast as u8 } else { 90 }; 3])
+        });
+        let d = GradientDetector::default();
+        let map = d.detect(&Photo::from_rgb(faint).unwrap());
+        let weakest = map.strength.iter().copied().fold(1.0, f32::min);
+        // A strength is m / (m + reference).
+        assert!(weakest >= d.low / (1.0 + d.low), "{weakest}");
+        assert!(weakest < 0.9 * d.high / (1.0 + d.high), "{weakest}");
+    }
+
+    #[test]
     fn brightness_does_not_matter() {
         let strong = GradientDetector::default().detect(&disc(200, 60.0, [255; 3], [60; 3]));
         let weak = GradientDetector::default().detect(&disc(200, 60.0, [120; 3], [100; 3]));

@@ -182,6 +182,23 @@ mod tests {
     }
 
     #[test]
+    fn the_shortest_list_counts() {
+        let long: &[f32] = &[1.0; 3];
+        let all = Elements { x: long, y: long, tx: long, ty: long, length: long, width: 9, height: 9 };
+        let two: &[f32] = &[1.0; 2];
+        for e in [
+            Elements { x: two, ..all },
+            Elements { y: two, ..all },
+            Elements { tx: two, ..all },
+            Elements { ty: two, ..all },
+            Elements { length: two, ..all },
+        ] {
+            assert_eq!((e.len(), e.in_view().count()), (2, 2));
+        }
+        assert_eq!(all.len(), 3);
+    }
+
+    #[test]
     fn sizes() {
         assert_eq!(diagonal(3, 4), 5.0);
         assert!(check_size(0, 4).is_err() && check_size(4, 16385).is_err() && check_size(1, 16384).is_ok());

@@ -210,3 +210,23 @@ fn variance(xs: &[f64]) -> f64 {
     let m = mean(xs.iter().copied());
     xs.iter().map(|x| (x - m) * (x - m)).sum::<f64>() / (xs.len() as f64 - 1.0)
 }
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+    use statrs::distribution::{ContinuousCDF, StudentsT};
+
+    #[test]
+    fn scores_are_judged_by_students_quantile() {
+        for (names, chains) in [(1, 10), (5, 40), (30, 200)] {
+            let draws = vec![vec![vec![0.5; names]; 3]; chains];
+            let judged = judged((0..names).map(|i| i.to_string()).collect(), &draws[0], &draws, 0);
+            let student = StudentsT::new(0.0, 1.0, chains as f64 - 1.0).unwrap();
+            let exact = student.inverse_cdf(1.0 - 0.5 * FALSE_ALARMS / (2 * names) as f64);
+            // The quantile is approximated from the normal one, to the first order.
+            let normal = inv_normal_cdf(1.0 - 0.5 * FALSE_ALARMS / (2 * names) as f64);
+            assert!(judged.threshold > normal && judged.threshold <= exact, "{}", judged.threshold);
+            assert!(exact - judged.threshold < 0.5 * (exact - normal), "{} {exact}", judged.threshold);
+        }
+    }
+}

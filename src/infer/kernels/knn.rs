@@ -225,9 +225,13 @@ fn log_normal(x: f64, sd: f64) -> f64 {
 
 /// The log density of a normal number taken round the circle.
 fn log_wrapped(x: f64, sd: f64) -> f64 {
+    if sd > 9.0 {
+        // Uniform to the last bit: what is left of its first harmonic is exp(-sd^2 / 2).
+        return -libm::log(TAU);
+    }
     let nearest = x - TAU * libm::round(x / TAU);
     // Beyond nine standard deviations there is nothing left to add.
-    let turns = libm::ceil(((9.0 * sd + PI) / TAU).min(1000.0)) as i32;
+    let turns = libm::ceil((9.0 * sd + PI) / TAU) as i32;
     let terms: Vec<f64> = (-turns..=turns).map(|k| log_normal(nearest + TAU * f64::from(k), sd)).collect();
     log_sum_exp(&terms)
 }

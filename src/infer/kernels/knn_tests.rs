@@ -142,3 +142,19 @@ fn without_neighbours_or_with_none_that_fit_it_is_the_prior() {
     let form: Latents = [(hash, Latent::Discrete(Datum::Bool(true)))].into_iter().collect();
     assert!(kernel(vec![other, form], &[]).log_density(&places(&t)).abs() < 1e-15);
 }
+
+#[test]
+fn wide_normals_round_the_circle_are_uniform() {
+    for (x, sd, expected) in
+        [(0.4, 20.0, -TAU.ln()), (-3.0, 1e6, -TAU.ln()), (TAU + 0.01, 0.01, -0.5 - 0.01f64.ln() - 0.5 * TAU.ln())]
+    {
+        let got = log_wrapped(x, sd);
+        assert!((got - expected).abs() < 1e-3, "{x} {sd}: {got}, {expected}");
+    }
+    // The density of a circle's numbers sums to one for any spread.
+    for sd in [0.3, 1.0, 2.0, 5.0] {
+        let n = 2000;
+        let total: f64 = (0..n).map(|i| log_wrapped(TAU * f64::from(i) / f64::from(n), sd).exp()).sum();
+        assert!((total * TAU / f64::from(n) - 1.0).abs() < 1e-9, "{sd}: {total}");
+    }
+}
