@@ -204,6 +204,7 @@ mod tests {
             key.stream(5, 9, 1),
             StreamKey::new(2, 0, Purpose::VALUES).stream(5, 9, 0),
             StreamKey::new(1, 1, Purpose::VALUES).stream(5, 9, 0),
+            StreamKey::new(1, 1 << 31, Purpose::VALUES).stream(5, 9, 0),
             StreamKey::new(1, 0, Purpose::KERNEL).stream(5, 9, 0),
         ] {
             assert!(first(other).iter().all(|x| !base.contains(x)));
@@ -231,6 +232,35 @@ mod tests {
         (0..70_000).for_each(|_| counts[s.index(7)] += 1);
         assert!(counts.iter().all(|c| (f64::from(*c) - 10_000.0).abs() < 600.0), "{counts:?}");
         assert_eq!(s.index(1), 0);
+    }
+
+    #[test]
+    fn indices_below_large_numbers_are_even() {
+        // Of 3/8 of all numbers: every eighth draw that is wrongly kept or dropped shows.
+        let n = 3usize << (usize::BITS - 3);
+        let mut s = StreamKey::new(0, 0, Purpose::KERNEL).stream(2, 0, 0);
+        let mut counts = [0u32; 3];
+        (0..30_000).for_each(|_| counts[s.index(n) % 3] += 1);
+        assert!(counts.iter().all(|c| (f64::from(*c) - 10_000.0).abs() < 500.0), "{counts:?}");
+    }
+
+    #[test]
+    fn weights_of_zero_are_never_chosen() {
+        // Half of the products with the least of all doubles are rounded up to it: past every weight.
+        let (tiny, mut s) = (f64::from_bits(1), StreamKey::new(0, 0, Purpose::KERNEL).stream(1, 0, 0));
+        assert!((0..100).all(|_| s.weighted(&[0.0, tiny, 0.0], tiny) == 1));
+        assert_eq!(s.weighted(&[0.0, 0.0], 0.0), 1, "there is nothing else");
+    }
+
+    #[test]
+    fn bytes_are_those_of_the_numbers() {
+        let key = StreamKey::new(3, 0, Purpose::VALUES);
+        let (mut a, mut b) = (key.stream(0, 0, 0), key.stream(0, 0, 0));
+        let mut bytes = [0u8; 20];
+        a.try_fill_bytes(&mut bytes).unwrap();
+        let expected: Vec<u8> = (0..3).flat_map(|_| b.next_u64().to_le_bytes()).collect();
+        assert_eq!(bytes[..], expected[..20]);
+        assert_eq!(a.next_u64(), b.next_u64(), "the rest of the last number is not used");
     }
 
     #[test]

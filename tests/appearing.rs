@@ -56,6 +56,19 @@ fn delayed_acceptance_sees_which_choices_appear() {
     assert_mean("c", &draws["c"], a / (a + b), 0.05);
 }
 
+/// A choice that the observation alone asks for appears, and nothing vanishes: the first stage pays nothing for it, so no such move
+/// may pass.
+#[test]
+fn delayed_acceptance_leaves_what_only_the_observation_asks_for() {
+    let text = "assume c ~ flip(0.5);
+         assume a ~ normal(2, 0.2);
+         observe normal(if c { a } else { 1.5 }, 0.5) = 2 with coarse = normal(if c { 1 } else { 2 }, 2) as y;
+         infer { repeat 20000 { mix { 0.5 => delayed(mh(@c), @y); 0.5 => block(@**); } collect c; } }";
+    let draws = run(text, 5, 2);
+    let (with, without) = (normal_pdf(2.0, 2.0, 0.29f64.sqrt()), normal_pdf(2.0, 1.5, 0.5));
+    assert_mean("c", &draws["c"], with / (with + without), 0.05);
+}
+
 /// The default plan moves the structure too, whatever the draw showed that the plan was made from.
 #[test]
 fn the_default_plan_goes_where_other_choices_are() {

@@ -3,7 +3,7 @@
 #![allow(dead_code)]
 
 use pcadlang::host::{Entry, Host, Previous, Type};
-use pcadlang::infer::{At, Kernel, Mh, Observer, Pick, Progress, Scope};
+use pcadlang::infer::{At, Drift, Kernel, Mh, Observer, Pick, Progress, Scope, Slice};
 use pcadlang::report::{Memory, RunDir};
 use pcadlang::trace::{Change, Draws, Selector, Trace};
 use pcadlang::{Error, Model, Posterior, Program, RunOptions, Value};
@@ -136,6 +136,26 @@ fn a_kernel_of_the_host_runs_by_name_and_is_checked_like_any_other() {
 }
 
 #[test]
+fn a_kernel_of_the_host_applies_another() {
+    struct Twice(Box<dyn Kernel>);
+    impl Kernel for Twice {
+        fn name(&self) -> String {
+            "twice".into()
+        }
+        fn step(&mut self, trace: &mut Trace, at: &At) -> pcadlang::trace::TraceResult<pcadlang::infer::Outcome> {
+            let mut all = self.0.step(trace, &at.within(0))?;
+            all.add(self.0.step(trace, &at.within(1))?);
+            Ok(all)
+        }
+    }
+    let twice = Entry::kernel("twice", |call: &mut pcadlang::host::KernelCall| Ok(Twice(call.kernel(0)?)));
+    let host = Host::new().with(twice.argument("move", Type::Kernel, "The kernel inside."));
+    let text = "assume x ~ normal(0, 1); observe normal(x, 1) = 1; infer { repeat 100 { twice(mh(@x)); } }";
+    let model = Program::parse(text).unwrap().host(&host).unwrap().compile().unwrap();
+    assert_eq!(model.run(&RunOptions::default(), 1, 1).unwrap().chains[0].kernels[0].proposals, 200);
+}
+
+#[test]
 fn a_distribution_of_the_host_gives_the_same_posterior_with_and_without_its_gradient() {
     let (with, without) =
         (embed_distribution::share("hmc(@**, steps = 5)"), embed_distribution::share("drift(one(@**))"));
@@ -245,6 +265,65 @@ fn what_a_host_s_distribution_does_wrong_reaches_no_accept_test() {
     let posterior = model.run(&RunOptions::default(), 1, 1).unwrap();
     let x = posterior.quantity("x[0]").unwrap().chains.concat();
     assert!(x.iter().all(|x| *x >= 0.0) && x.iter().any(|a| *a != x[0]));
+}
+
+/// A point of the unconstrained space says nothing of the discrete part of a value: `knn` draws such a value from its prior.
+#[test]
+fn neighbours_do_not_move_what_is_in_part_discrete() {
+    use pcadlang::host::{Datum, Distribution, Gradient, Support};
+    use pcadlang::infer::{Knn, Latent, Neighbours};
+    /// A standard normal number, and 0 or 1.
+    #[derive(Debug)]
+    struct Toss;
+    impl Distribution for Toss {
+        fn name(&self) -> &str {
+            "toss"
+        }
+        fn support(&self) -> Support {
+            Support::Each([Support::Real, Support::Integers { lo: 0, hi: Some(1) }].into())
+        }
+        fn sample(&self, rng: &mut pcadlang::rng::Stream) -> Datum {
+            vec![rng.standard_normal(), rng.index(2) as f64].into()
+        }
+        fn log_density(&self, x: &Datum) -> f64 {
+            match x {
+                Datum::Vec(xs) if self.support().contains(x) => {
+                    -0.5 * (xs[0] * xs[0] + std::f64::consts::TAU.ln()) - 2f64.ln()
+                }
+                _ => f64::NEG_INFINITY,
+            }
+        }
+        fn gradient(&self, _: &Datum) -> Option<Gradient> {
+            None
+        }
+    }
+    let host = Host::new().with(Entry::distribution("toss", |_| Ok(Toss)).argument("n", Type::Num, "Anything."));
+    let text = "assume x ~ toss(1); observe normal(x[0], 1) = 0.5;";
+    let model = Program::parse(text).unwrap().host(&host).unwrap().compile().unwrap();
+    let scenes: Vec<_> = (0..5).map(|i| Latent::all(&model.simulate(2, i).unwrap())).collect();
+    let scope = Scope { selector: Selector::All, pick: Pick::All };
+    let mut kernel = Knn::new(scope, std::sync::Arc::new(Neighbours::new(scenes, &[])));
+    let mut trace = model.simulate(1, 0).unwrap();
+    let (mut ones, mut accepted) = (0, 0);
+    for step in 0..4000 {
+        accepted += kernel.step(&mut trace, &At::new(1, 0, step)).unwrap().accepted;
+        let side = trace.value(trace.all_targets()[0]).element(1);
+        ones += u32::from(side.is_some_and(|side| side.same(&Value::Num(1.0))));
+    }
+    assert!(accepted > 1000 && (1700..2300).contains(&ones), "{accepted} accepted, {ones} ones");
+
+    // Kernels that move along coordinates leave it alone: there is no way back to the part that has none.
+    let x = |t: &Trace| format!("{:?}", t.value(t.all_targets()[0]));
+    let is_one = |t: &Trace| t.value(t.all_targets()[0]).element(1).is_some_and(|v| v.same(&Value::Num(1.0)));
+    let mut trace = (0..50).map(|i| model.simulate(1, i).unwrap()).find(is_one).unwrap();
+    let before = x(&trace);
+    let all = || Scope { selector: Selector::All, pick: Pick::All };
+    let mut kernels: [Box<dyn Kernel>; 2] =
+        [Box::new(Drift::new(all(), None)), Box::new(Slice::new(all(), None, true))];
+    for kernel in &mut kernels {
+        (0..50).for_each(|step| _ = kernel.step(&mut trace, &At::new(1, 0, step)).unwrap());
+        assert_eq!(x(&trace), before, "{}", kernel.name());
+    }
 }
 
 /// Names made at run time cost no leak: an entry owns them, and goes with its host.

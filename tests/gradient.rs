@@ -337,6 +337,14 @@ fn structure_passes_derivatives_through() {
     }
 }
 
+/// Several elements of the choices of a loop at once.
+#[test]
+fn elements_picked_by_an_array() {
+    let text = "for i in 0 .. 3 { w[i] ~ normal(i, 1); } observe normal(w[[2, 0]], 0.5) = [1, -2];";
+    let model = Program::parse(text).unwrap().compile().unwrap_or_else(|e| panic!("{text}\n{e}"));
+    compare(&mut model.simulate(1, 0).unwrap(), text);
+}
+
 #[test]
 fn bodies_with_detected_joints() {
     let keypoints = r#"{ "nose": [120, 40, 0.9], "l_shoulder": [150, 90, 1], "r_elbow": [80, 130, 0.7], "l_knee": [140, 190],

@@ -2,10 +2,11 @@
 //! saves evaluations of what it stands for.
 
 use pcadlang::Model;
+use pcadlang::host::Datum;
 use pcadlang::infer::{Abc, At, Delayed, Drift, Kernel, Mh, Pick, Scope, Smc, Temper};
 use pcadlang::lang::value::Value;
 use pcadlang::syntax::span::Span;
-use pcadlang::trace::{Pattern, Selector, Trace};
+use pcadlang::trace::{Change, Draws, Pattern, Selector, Trace};
 
 fn scope() -> Scope {
     Scope { selector: Selector::All, pick: Pick::All }
@@ -74,4 +75,22 @@ fn the_observation_is_evaluated_for_what_the_surrogate_accepts() {
     let (states, accepted, evaluated) = run(true);
     assert!(accepted > 100 && (accepted as usize..1000).contains(&evaluated), "{accepted}, {evaluated}");
     assert_eq!(states, run(false).0);
+}
+
+/// What was proposed and neither kept nor undone has no say in a step.
+#[test]
+fn the_surrogate_does_not_follow_what_is_pending() {
+    let text = "assume x ~ normal(0, 1); observe normal(x, 0.5) = 1 with coarse = normal(x, 1) as y;";
+    let mut trace: Trace = Model::from_text(text).unwrap().simulate(1, 0).unwrap();
+    let at = Selector::Address(Pattern::exact(&trace.observations()[0].0));
+    let kernel = || Delayed::new(Box::new(Mh::new(scope())), at.clone(), Span::default());
+    let (mut one, mut other, mut disturbed) = (kernel(), kernel(), trace.clone());
+    let value = |t: &Trace| t.value(t.all_targets()[0]);
+    for i in 0..100 {
+        let x = disturbed.all_targets()[0];
+        disturbed.propose(&[(x, Change::Set(Datum::Num(3.0)))], Draws::default()).unwrap();
+        one.step(&mut trace, &At::new(1, 0, i)).unwrap();
+        other.step(&mut disturbed, &At::new(1, 0, i)).unwrap();
+        assert!(value(&disturbed).same(&value(&trace)), "step {i}");
+    }
 }

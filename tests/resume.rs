@@ -84,6 +84,8 @@ fn every_statement() {
         "for s in [0.1, 1] { for t in [\"u\", \"v\"] { drift(@a, s); mh(each(@**)); collect a; } }",
         "repeat 30 { repeat 3 { mix { 0.5 => both(1); 0.5 => gibbs(each($finite)); } stop when a > 0.5; } collect a, x; }",
         "init(best_of(12, keep = 6)); warmup 200 { anneal(50); mh(one(@**)); } repeat 10 { mh(one(@**)); }",
+        // Nothing but a warm-up: it ends as the chain does.
+        "warmup 10 { mh(one(@**)); }",
     ];
     for plan in plans {
         let model = of_text(&format!("{MODEL} infer {{ {plan} }}"));

@@ -271,6 +271,70 @@ fn work_does_not_grow_with_the_trace() {
     assert_eq!(few, executed(1000));
 }
 
+/// What branches needed that were left is used again: a chain may change its structure as often as it likes.
+#[test]
+fn storage_of_branches_is_used_again() {
+    let model = Model::from_text(
+        "assume c ~ flip(0.5); assume x = if c { a ~ normal(0, 1); a } else { b ~ gamma(2, 1); b };
+         observe normal(x, 1) = 0.5;",
+    )
+    .unwrap_or_else(|e| panic!("{e}"));
+    let limits = Limits { nodes: 100, ..Limits::default() };
+    let mut t = Trace::simulate(model.code().clone(), at(0), limits).unwrap_or_else(|e| panic!("{e}"));
+    let c = t.find(&"@c".parse().unwrap()).unwrap();
+    for step in 0..1000u64 {
+        let set = [(c, Change::Set(pcadlang::dist::Datum::Bool(step % 2 == 0)))];
+        t.propose(&set, at(step + 1)).unwrap_or_else(|e| panic!("step {step}: {e}"));
+        if step % 5 == 0 {
+            t.rollback();
+        } else {
+            t.commit();
+        }
+    }
+    assert_eq!(t.choices().len(), 2);
+}
+
+/// What a map runs over goes when the map does, also if its elements changed in between.
+#[test]
+fn what_a_map_ran_over_is_let_go() {
+    use pcadlang::dist::Datum::{Bool, Num};
+    let (_, mut t) = trace(
+        "assume c ~ flip(0.5); for i in 0 .. 3 { w[i] ~ normal(0, 1); }
+         assume y = if c { sum(map(fn(x) { x * 2 }, w)) } else { 0 }; observe normal(y, 1) = 1;",
+        1,
+    );
+    let moves = [("@c", Bool(true), 4), ("@w[0]", Num(0.7), 4), ("@w[1]", Num(-0.2), 4), ("@c", Bool(false), 1)];
+    for (step, (name, value, choices)) in (0..).zip(moves) {
+        let target = t.find(&name.parse().unwrap()).unwrap();
+        t.propose(&[(target, Change::Set(value))], at(step)).unwrap_or_else(|e| panic!("{e}"));
+        t.commit();
+        assert_eq!(t.choice_count(), choices, "{name}: {:?}", addresses(&t));
+    }
+}
+
+/// Gradients are those of the state to the last bit, whatever was built and let go on the way there.
+#[test]
+fn gradients_do_not_depend_on_the_past() {
+    let (_, mut t) = trace(
+        "assume m ~ normal(0, 1); assume n ~ poisson(8);
+         for i in 0 .. n + 1 { w[i] ~ normal(m, 1); observe normal(0.7 * w[i] + m, 0.3) = 0.37 * i; }",
+        1,
+    );
+    let by_m = |t: &Trace| {
+        let (m, mut slope) = (t.find(&"@m".parse().unwrap()).unwrap(), Vec::new());
+        t.gradient(&[m], 1.0, &mut slope).unwrap_or_else(|e| panic!("{e}"));
+        slope[0].to_bits()
+    };
+    let n = t.find(&"@n".parse().unwrap()).unwrap();
+    for step in 0..40u64 {
+        let set = Change::Set(pcadlang::dist::Datum::Num((step * 7 % 19) as f64));
+        t.propose(&[(n, set)], at(step)).unwrap_or_else(|e| panic!("{e}"));
+        t.commit();
+        let fresh = t.rerun().unwrap_or_else(|e| panic!("{e}"));
+        assert_eq!(by_m(&t), by_m(&fresh), "step {step}");
+    }
+}
+
 /// The surrogate of an observation is scored on demand and is no part of the joint.
 #[test]
 fn surrogates_are_not_part_of_the_joint() {

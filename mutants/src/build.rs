@@ -19,8 +19,8 @@ pub struct TestProgram {
 /// What the copy lacks.
 const LEFT_OUT: [&str; 3] = ["target", ".git", "mutants"];
 
-/// Copies the project; files that are as they were are left alone.
-pub fn copy(from: &Path, to: &Path) -> Result<(), Failure> {
+/// Copies the project but for some files, which are written otherwise; files that are as they were are left alone.
+pub fn copy(from: &Path, to: &Path, without: &[PathBuf]) -> Result<(), Failure> {
     std::fs::create_dir_all(to)?;
     for entry in std::fs::read_dir(from)? {
         let (path, name) = {
@@ -32,8 +32,8 @@ pub fn copy(from: &Path, to: &Path) -> Result<(), Failure> {
         }
         let target = to.join(&name);
         if path.is_dir() {
-            copy(&path, &target)?;
-        } else if path.is_file() {
+            copy(&path, &target, without)?;
+        } else if path.is_file() && !without.contains(&path) {
             put(&target, &std::fs::read(&path)?)?;
         }
     }
@@ -102,8 +102,11 @@ fn blamed(messages: &[Value], places: &Places) -> (BTreeSet<usize>, Vec<String>)
     (out, others)
 }
 
-/// Builds the tests; mutants that do not compile go.
+/// Builds the tests; mutants that do not compile go. Those are kept in a file, so that another run builds nothing again.
 pub fn build(root: &Path, copy: &Path, mutants: &mut Vec<Mutant>) -> Result<Vec<TestProgram>, Failure> {
+    let list = copy.join("do-not-compile.txt");
+    let mut known = std::fs::read_to_string(&list).unwrap_or_default();
+    mutants.retain(|m| !known.lines().any(|key| key == m.key));
     loop {
         let places = write(root, copy, mutants)?;
         let (ok, messages) = cargo(copy, &["check", "--lib"])?;
@@ -115,6 +118,8 @@ pub fn build(root: &Path, copy: &Path, mutants: &mut Vec<Mutant>) -> Result<Vec<
             return Err(others.join("\n").into());
         }
         println!("{} do not compile", out.len());
+        out.iter().for_each(|id| known = format!("{known}{}\n", mutants[*id].key));
+        std::fs::write(&list, &known)?;
         let mut id = 0;
         mutants.retain(|_| {
             id += 1;

@@ -1,7 +1,8 @@
 //! Mutation testing by schemata: many small errors are built into one copy of the library, each behind a number, and the tests run
 //! once for each number. What no test notices is a survivor: a test is missing, or the error makes no difference.
 //!
-//!     cargo run --release --manifest-path mutants/Cargo.toml -- [--mutants N] [--minutes M] [--jobs J] [--work DIR]
+//!     cargo run --release --manifest-path mutants/Cargo.toml -- [--mutants N] [--minutes M] [--patience SECONDS] [--jobs J]
+//!         [--work DIR]
 //!
 //! Run from the project's root. Results are kept in `mutants/results.jsonl`, one line a mutant, and what is there is not run again: a
 //! run that was stopped goes on. A mutant is known by its file, function and text, so edits elsewhere leave it as it is.
@@ -27,21 +28,29 @@ pub type Failure = Box<dyn std::error::Error + Send + Sync>;
 struct Options {
     mutants: usize,
     minutes: u64,
+    /// How long tests of a mutant may take that none of them catches, in seconds.
+    patience: u64,
     jobs: usize,
     work: PathBuf,
 }
 
 fn options() -> Result<Options, Failure> {
-    let mut o = Options { mutants: 480, minutes: 24 * 60, jobs: 1, work: PathBuf::from("target/mutants") };
+    let mut o =
+        Options { mutants: 480, minutes: 24 * 60, patience: 3600, jobs: 1, work: PathBuf::from("target/mutants") };
     let mut args = std::env::args().skip(1);
     while let Some(name) = args.next() {
         let value = args.next().ok_or_else(|| format!("{name} needs a value"))?;
         match &*name {
             "--mutants" => o.mutants = value.parse()?,
             "--minutes" => o.minutes = value.parse()?,
+            "--patience" => o.patience = value.parse()?,
             "--jobs" => o.jobs = value.parse()?,
             "--work" => o.work = value.into(),
-            _ => return Err(format!("no option {name}: there are --mutants, --minutes, --jobs and --work").into()),
+            _ => {
+                return Err(
+                    format!("no option {name}: there are --mutants, --minutes, --patience, --jobs and --work").into()
+                );
+            }
         }
     }
     Ok(o)
@@ -57,12 +66,14 @@ fn main() -> Result<(), Failure> {
     let copy = if o.work.is_absolute() { o.work.clone() } else { root.join(&o.work) };
     let mut mutants = find::select(&root, &FOLDERS, o.mutants)?;
     println!("{} mutants chosen", mutants.len());
-    build::copy(&root, &copy)?;
+    let rewritten: Vec<PathBuf> = mutants.iter().map(|m| m.file.clone()).chain([root.join("src/lib.rs")]).collect();
+    build::copy(&root, &copy, &rewritten)?;
     let tests = build::build(&root, &copy, &mut mutants)?;
     println!("{} of them compile; {} test programs", mutants.len(), tests.len());
     let reached = reach::reached(&copy, &tests, mutants.len())?;
     let results = Results::open(&root.join("mutants/results.jsonl"))?;
-    run::all(&copy, &mutants, &reached, &results, o.jobs, until)?;
+    let patience = Duration::from_secs(o.patience);
+    run::all(&copy, &mutants, &reached, &results, o.jobs, until, patience)?;
     results.report(&mutants);
     Ok(())
 }

@@ -15,7 +15,7 @@ use std::time::{Duration, Instant};
 /// More tests than these are run as a whole program.
 const SINGLE: usize = 60;
 
-/// Runs what is not known yet, until there is no time left.
+/// Runs what is not known yet, until there is no time left. A mutant that `patience` of tests have not caught is given up.
 pub fn all(
     copy: &Path,
     mutants: &[Mutant],
@@ -23,6 +23,7 @@ pub fn all(
     results: &Results,
     jobs: usize,
     until: Instant,
+    patience: Duration,
 ) -> Result<(), Failure> {
     let (next, failed) = (AtomicUsize::new(0), Mutex::new(None));
     // Spread over files, so that a run that is cut short has seen some of each.
@@ -36,7 +37,7 @@ pub fn all(
             if results.knows(&mutants[*id]) {
                 continue;
             }
-            let done = one(copy, *id, reached).and_then(|caught| {
+            let done = one(copy, *id, reached, patience).and_then(|caught| {
                 println!("{}: {}", mutants[*id].key, caught.as_deref().unwrap_or("NOT CAUGHT"));
                 results.put(&mutants[*id], caught)
             });
@@ -51,14 +52,21 @@ pub fn all(
 }
 
 /// What catches a mutant: single tests that come by it, then whole programs where others may.
-fn one(copy: &Path, id: usize, reached: &[Reached]) -> Result<Option<String>, Failure> {
+fn one(copy: &Path, id: usize, reached: &[Reached], patience: Duration) -> Result<Option<String>, Failure> {
     let few = |r: &&Reached| r.tests[id].len() <= SINGLE;
+    let until = Instant::now() + patience;
     for r in reached.iter().filter(|r| !r.tests[id].is_empty()).filter(few) {
+        if Instant::now() > until {
+            break;
+        }
         if let Some(by) = fails(copy, id, r, r.tests[id].iter().map(String::as_str).collect())? {
             return Ok(Some(by));
         }
     }
     for r in reached.iter().filter(|r| r.any[id] && (r.unnamed[id] || !few(r))) {
+        if Instant::now() > until {
+            break;
+        }
         if let Some(by) = fails(copy, id, r, Vec::new())? {
             return Ok(Some(by));
         }

@@ -86,6 +86,15 @@ impl Support {
         }
     }
 
+    /// Whether some part of a value is discrete.
+    pub fn has_discrete_part(&self) -> bool {
+        match self {
+            Support::Product(one, _) => one.has_discrete_part(),
+            Support::Each(all) => all.iter().any(Support::has_discrete_part),
+            one => one.is_discrete(),
+        }
+    }
+
     /// Whether [`Support::finite_values`] has an answer.
     pub fn is_finite(&self) -> bool {
         match self {

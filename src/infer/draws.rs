@@ -249,4 +249,12 @@ mod tests {
         assert_eq!(total[0].acceptance(), Some(0.5));
         assert_eq!(KernelStats::default().acceptance(), None);
     }
+
+    #[test]
+    fn estimates_of_the_evidence_are_averaged() {
+        let k = |log_evidence| KernelStats { name: "smc".into(), log_evidence, ..Default::default() };
+        let total = KernelStats::total(&[k(Some(libm::log(2.0))), k(None), k(Some(libm::log(4.0)))]);
+        assert!((total[0].log_evidence.unwrap() - libm::log(3.0)).abs() < 1e-15, "{:?}", total[0].log_evidence);
+        assert_eq!(KernelStats::total(&[k(None)])[0].log_evidence, None);
+    }
 }

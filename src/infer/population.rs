@@ -104,6 +104,7 @@ impl Population {
 #[cfg(test)]
 mod tests {
     use super::*;
+    use crate::model::Model;
     use crate::rng::{Purpose, StreamKey};
 
     fn population(log_likelihoods: &[f64]) -> Population {
@@ -137,5 +138,18 @@ mod tests {
         let mut p = population(&[f64::NEG_INFINITY, f64::NEG_INFINITY]);
         p.resample(0.5, 2, &mut rng);
         assert_eq!(p.members.len(), 2);
+    }
+
+    #[test]
+    fn the_turns_of_all_members_are_equally_long() {
+        let model = Model::from_text("assume x ~ normal(0, 1); observe normal(x, 1) = 0;").unwrap();
+        let begun: Vec<Trace> = (0..3).map(|i| model.simulate(1, i).unwrap()).collect();
+        let value = |t: &Trace| t.stored(t.all_targets()[0]);
+        let mut rng = StreamKey::new(1, 0, Purpose::POPULATION).stream(0, 0, 0);
+        let (mut trace, mut p) = (begun[0].clone(), Population::new(&begun));
+        for step in 1..3 * LEG {
+            p.advance(&mut trace, (0.0, 0.5), Draws::default(), &mut rng).unwrap();
+            assert_eq!(value(&trace), value(&begun[(step / LEG) as usize]), "after step {step}");
+        }
     }
 }

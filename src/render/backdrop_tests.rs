@@ -2,7 +2,7 @@
 
 use super::*;
 use crate::geom::Affine;
-use crate::render::testing::{Uniform, cuboid, lathe, sphere};
+use crate::render::testing::{Uniform, cuboid, lathe, solid, sphere};
 use glam::{DVec3, Vec3};
 
 /// A ball, a box, an open or a closed lathe.
@@ -201,4 +201,49 @@ fn odd_placements_are_as_drawn_at_once() {
         }
     }
     assert!(drawn > 30, "{drawn}");
+}
+
+#[test]
+fn what_looks_out_from_behind_a_wall_is_seen_on_every_side() {
+    let camera = Camera::default_for(64, 64);
+    // In the picture the wall reaches 15 pixels from the middle, and the ball behind it 5 from its own.
+    let (wall, inside) = (cuboid(Vec3::new(1.0, 1.0, 0.2)), cuboid(Vec3::splat(0.1)));
+    let fixed = Solid::group(&[wall, inside.clone(), inside]);
+    let ball = sphere(16, 9);
+    let mut followed = Followed::new(&camera);
+    let places = [[0.0, 0.0], [0.1, 0.0], [0.0, -0.98], [0.0, 0.98], [-0.98, 0.0], [0.98, 0.0], [0.0, 0.1]];
+    for (step, [x, y]) in places.into_iter().enumerate() {
+        let by = Affine::new(DVec3::new(x, y, -1.5), DVec3::ZERO, DVec3::splat(0.4));
+        let [by_backdrop, _] = followed.check(&Solid::group(&[fixed.clone(), ball.placed(by)]), &camera);
+        assert_eq!(by_backdrop, step > 0);
+        let seen = followed.backdrop.contours(&camera);
+        let beside = seen.x.iter().zip(&seen.y).any(|(&x, &y)| (x - 32.0).abs().max((y - 32.0).abs()) > 16.0);
+        assert_eq!(beside, (2..6).contains(&step), "{x} {y}");
+    }
+}
+
+#[test]
+fn what_only_the_depth_range_decides_is_told_anew_behind_what_stays_as_deep() {
+    let camera = Camera::default_for(64, 64);
+    let square = |half: f32, x: f32, z: f32| {
+        [[-half, -half], [half, -half], [half, half], [-half, half]].map(|[u, v]| Vec3::new(x + u, v, z))
+    };
+    let flat = |half: f32, x: f32, z: f32| solid(square(half, x, z).to_vec(), vec![[0, 1, 2], [0, 2, 3]]);
+    // In the middle at depth 8, and to both sides at 7, which is the least.
+    let fixed = Solid::group(&[flat(0.3, 0.0, 0.0), flat(0.2, 1.6, 1.0), flat(0.2, -1.6, 1.0)]);
+    // A shield, and behind it what is farthest off: stretched, the shield stays where it is.
+    let corners = [square(1.0, 0.0, 0.0), square(0.1, 0.0, -1.0)].concat();
+    let shield = solid(corners, vec![[0, 1, 2], [0, 2, 3], [4, 5, 6], [4, 6, 7]]);
+    // Nearer than the middle by this, it hides that where 0.006 of the depth range and 1e-6 of the depth are less.
+    let nearer = 0.006 * 2.0045 + 8e-6;
+    let mut followed = Followed::new(&camera);
+    for (step, range) in [1.8, 2.0, 2.009, 2.0, 2.009].into_iter().enumerate() {
+        let stretched = DVec3::new(1.0, 1.0, range - 1.0 + nearer);
+        let by = Affine::new(DVec3::new(0.0, 0.0, nearer), DVec3::ZERO, stretched);
+        let drawn = followed.check(&Solid::group(&[fixed.clone(), shield.placed(by)]), &camera);
+        assert_eq!(drawn, [step > 0, step > 1]);
+        let seen = followed.backdrop.contours(&camera);
+        let middle = seen.x.iter().zip(&seen.y).any(|(&x, &y)| (x - 32.0).abs().max((y - 32.0).abs()) < 8.0);
+        assert_eq!(middle, step > 0 && range > 2.0045, "{range}");
+    }
 }

@@ -123,7 +123,8 @@ impl Layers {
         let mut out = Contours::with_room(camera, self.found);
         for shown in &self.shown {
             let Some(slot) = self.slots.get_mut(shown.at) else { continue };
-            let seen_before = slot.seen_at + 1 == self.clock || slot.seen_at == self.clock;
+            // 0 is never, also in the first drawing.
+            let seen_before = slot.seen_at > 0 && slot.seen_at + 1 >= self.clock;
             let layer = &mut slot.layer;
             if !(same_range && seen_before) || self.dirty.iter().any(|dirty| dirty.meets(&layer.looks)) {
                 self.bytes -= layer.bytes();

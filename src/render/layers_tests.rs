@@ -150,3 +150,56 @@ fn what_cannot_be_seen_leaves_an_empty_layer() {
         assert!(layers.found == 0 && layers.depth.iter().all(|d| *d == f32::INFINITY), "{at:?}");
     }
 }
+
+#[test]
+fn a_mesh_between_the_centres_of_pixels_has_contours_as_soon_as_it_is_there() {
+    let camera = Camera::default_for(48, 48);
+    let cube = |half: f32, x: f64| {
+        let by = Affine::new(DVec3::new(x, 0.0, 0.0), DVec3::ZERO, DVec3::ONE);
+        Arc::new(cuboid(Vec3::splat(half)).placed(by).to_mesh().unwrap())
+    };
+    let mut layers = Layers::default();
+    let mut meshes = vec![cube(0.4, -1.0), cube(0.4, 1.0)];
+    let others = Contours::drawn(&group(&meshes, Affine::IDENTITY), &camera).len();
+    meshes.push(cube(0.02, 0.0));
+    // A pixel is 0.09 wide, and four of them meet in the middle. The depth range stays as it is.
+    for half in [0.02, 0.015, 0.01, 0.025] {
+        meshes[2] = cube(half, 0.0);
+        check(&mut layers, &group(&meshes, Affine::IDENTITY), &camera);
+        assert!(layers.shown[2].area.pixels() == 0 && layers.found > others, "{half}");
+    }
+}
+
+#[test]
+fn flat_meshes_between_the_centres_of_pixels_are_seen_in_the_first_drawing() {
+    let camera = Camera::default_for(48, 48);
+    // Triangles at one depth: the range of the scene is 0 from the start.
+    let flat = |half: f32, x: f32| {
+        let corners = [[-half, -half], [half, -half], [0.0, half]].map(|[u, v]| Vec3::new(x + u, v, 0.0));
+        Arc::new(Mesh::new(corners.to_vec(), vec![[0, 1, 2]], vec![0]).unwrap())
+    };
+    let meshes = [flat(0.4, -1.0), flat(0.4, 1.0), flat(0.02, 0.0)];
+    let mut layers = Layers::default();
+    check(&mut layers, &group(&meshes, Affine::IDENTITY), &camera);
+    assert_eq!(layers.extent, 0.0);
+    assert!(layers.shown[2].area.pixels() == 0 && layers.found > 0);
+}
+
+#[test]
+fn memory_is_taken_first_from_meshes_that_are_gone() {
+    // Each fills the picture: 1.4 MB of depth in the small one, 5.8 MB in the large one.
+    let blocks = |count: u32| -> Vec<Arc<Mesh>> {
+        let block = |i: u32| cuboid(Vec3::splat(3.0 + 0.01 * i as f32)).to_mesh().unwrap();
+        (0..count).map(|i| Arc::new(block(i))).collect()
+    };
+    let mut layers = Layers::default();
+    check(&mut layers, &group(&blocks(20), Affine::IDENTITY), &Camera::default_for(600, 600));
+    assert!(layers.slots.iter().all(|slot| slot.mesh.strong_count() == 0));
+    let there = group(&blocks(3), Affine::IDENTITY);
+    let large = Camera::default_for(1200, 1200);
+    check(&mut layers, &there, &large);
+    assert!(layers.bytes <= BYTES && layers.slots.len() < 20);
+    let before = work::work();
+    check(&mut layers, &there, &large);
+    assert_eq!((work::work() - before).kept, 3);
+}

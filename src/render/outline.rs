@@ -66,6 +66,27 @@ mod tests {
     use glam::Vec3;
 
     #[test]
+    fn gains_are_read_bilinearly_up_to_the_border() {
+        let gain = [1.0, 2.0, 4.0, 3.0, 5.0, 9.0];
+        for (x, y, expected) in [
+            (0.5, 0.5, 1.0),
+            (2.5, 0.5, 4.0),
+            (1.5, 1.5, 5.0),
+            (1.0, 0.5, 1.5),
+            (0.5, 1.0, 2.0),
+            (1.0, 1.0, 2.75),
+            (2.25, 0.75, 4.625),
+            (0.0, 0.0, 1.0),
+            (3.0, 2.0, 9.0),
+            (0.0, 2.0, 3.0),
+        ] {
+            assert_eq!(between(&gain, 3, 2, x, y), expected, "{x} {y}");
+        }
+        assert_eq!(between(&[1.0, 2.0], 2, 1, 1.0, 0.9), 1.5);
+        assert_eq!(between(&[1.0, 2.0], 1, 2, 0.1, 1.0), 1.5);
+    }
+
+    #[test]
     fn sums_over_silhouettes_change_as_predicted() {
         const SIZE: u32 = 192;
         // A smooth gain, and pictures coarse enough that a difference of some pixels tells the slope.

@@ -72,4 +72,15 @@ mod tests {
         let picture = shade(&frame);
         assert!(picture.get_pixel(0, 0)[0] < picture.get_pixel(1, 0)[0]);
     }
+
+    #[test]
+    fn depth_alone_is_grey_from_0_15_to_0_85_of_white() {
+        let grey = |depth: Vec<f32>| {
+            let frame = Frame { width: depth.len() as u32, height: 1, depth, part: Vec::new(), normal: Vec::new() };
+            shade(&frame).pixels().map(|p| p.0).collect::<Vec<_>>()
+        };
+        assert_eq!(grey(vec![1.0, 1.25, 2.0]), [[38_u8; 3], [83; 3], [217; 3]]);
+        // Where all is equally far.
+        assert_eq!(grey(vec![3.0, 3.0, f32::INFINITY]), [[38; 3], [38; 3], BACKGROUND]);
+    }
 }

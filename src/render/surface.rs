@@ -59,3 +59,37 @@ impl View {
         out
     }
 }
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+    use crate::render::testing::solid;
+    use crate::render::{Camera, Projection};
+    use glam::Vec3;
+
+    #[test]
+    fn depth_moves_with_the_plane_of_the_face_that_is_seen() {
+        // On the plane z = x / 8, whose depth at a pixel grows by dx / 8 - dz where the line of sight is along -z.
+        let corners = [Vec3::new(-2.0, -2.0, -0.25), Vec3::new(14.0, -2.0, 1.75), Vec3::new(-2.0, 6.0, -0.25)];
+        let triangle = solid(corners.to_vec(), vec![[0, 1, 2]]);
+        let pinhole = Camera::default_for(3, 3);
+        let projection = Projection::Orthographic { units_per_pixel: 1.0, cx: 1.5, cy: 1.5 };
+        let parallel = Camera { projection, ..pinhole };
+        // The middle pixel shows the origin, the one to the right of it (1, 0, 1 / 8): the shares of the corners there.
+        for (camera, pixel, shares) in [
+            (pinhole, 4, [0.625, 0.125, 0.25]),
+            (parallel, 4, [0.625, 0.125, 0.25]),
+            (parallel, 5, [0.5625, 0.1875, 0.25]),
+        ] {
+            let mut by_depth = [0.0; 9];
+            by_depth[pixel] = 2.0;
+            let by_vertex = View::new(triangle.clone(), camera).pull_depth(3, &by_depth);
+            assert_eq!(by_vertex.len(), 3);
+            for (p, g) in triangle.vertices().zip(by_vertex) {
+                let corner = corners.iter().position(|c| c.as_dvec3() == p).unwrap();
+                let expected = DVec3::new(0.125, 0.0, -1.0) * (2.0 * shares[corner]);
+                assert!((g - expected).length() < 1e-12, "{camera:?}: {g} {expected}");
+            }
+        }
+    }
+}

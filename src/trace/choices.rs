@@ -221,7 +221,7 @@ impl Graph {
             choice: matches!(self.op(code, n), Op::Draw { .. }),
             address: if with_address { self.address(code, n) } else { Address::default() },
             tags: self.tags(code, n),
-            discrete: support.as_ref().is_some_and(Support::is_discrete),
+            discrete: support.as_ref().is_some_and(Support::has_discrete_part),
             finite: support.as_ref().is_some_and(Support::is_finite),
             gaussian: dist.is_some_and(Dist::is_gaussian),
         }

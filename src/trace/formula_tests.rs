@@ -108,6 +108,15 @@ fn conditions_and_arithmetic() {
 }
 
 #[test]
+fn families_that_take_arrays_and_bounds() {
+    let [weights, _] = compared(
+        "assume k ~ categorical([1, 2, 1]) #d; assume m ~ normal(0, 1);
+         observe truncated_normal(k + m, 1, -5, 5) = 0.7; observe von_mises(k, 2) = 1;",
+    );
+    assert!(weights > 100, "{weights}");
+}
+
+#[test]
 fn choices_that_would_vanish_are_left_to_updates() {
     let once = "assume a ~ normal(0, 1); assume f ~ flip(0.5) #d; observe normal(if f { a } else { 0 }, 1) = 1;";
     assert_eq!(compared(once), [0, 0]);
@@ -119,6 +128,16 @@ fn choices_that_would_vanish_are_left_to_updates() {
     assert_eq!(compared(element), [0, 0]);
     let held = format!("{twice} observe normal(a, 1) = 0;");
     assert_eq!(compared(&held)[0], 60);
+}
+
+#[test]
+fn impossible_states_are_left_to_updates() {
+    // With one of two impossible terms gone it is impossible still.
+    let [weights, _] = compared(
+        "assume k ~ flip(0.5) #d; assume j ~ flip(0.5) #d;
+         observe uniform(if k { 1 } else { 0 }, 2) = 0.5; observe uniform(if j { 1 } else { 0 }, 2) = 0.5;",
+    );
+    assert!(weights > 0);
 }
 
 #[test]

@@ -36,7 +36,7 @@ pub enum Selector {
 pub enum ChoiceKind {
     /// `$continuous`
     Continuous,
-    /// `$discrete`
+    /// `$discrete`: in part at least.
     Discrete,
     /// `$gaussian`: normal, mv_normal, gp.
     Gaussian,
@@ -214,5 +214,27 @@ mod tests {
         assert!(!pattern(&[(Some("**"), &[]), (Some("rot"), &[Some("x")])]).matches(&a));
         assert!(pattern(&[(None, &[None]), (Some("bone"), &[])]).matches(&a));
         assert!(!pattern(&[(Some("pos"), &[])]).matches(&a));
+    }
+
+    #[test]
+    fn what_a_selector_names_it_may_name() {
+        let a = Address { segments: vec![segment("pose", &["arm"]), segment("bone", &[]), segment("rot", &["z"])] };
+        let exact = Selector::Address(Pattern::exact(&a));
+        let below = Selector::Address(pattern(&[(Some("pose"), &[None]), (Some("**"), &[])]));
+        let (all, nothing) = (Box::new(Selector::All), Box::new(Selector::Nothing));
+        for s in [
+            Selector::All,
+            exact.clone(),
+            below.clone(),
+            Selector::Union(Box::new(below), nothing.clone()),
+            Selector::Both(all.clone(), Box::new(exact)),
+            Selector::Minus(all, nothing),
+        ] {
+            assert!(s.names(&a), "{s:?}");
+            assert!(s.may_name(&["bone", "rot"]) && s.may_name(&["rot"]), "{s:?}");
+        }
+        for s in [Selector::Nothing, Selector::Kind(ChoiceKind::Discrete)] {
+            assert!(!s.names(&a) && !s.may_name(&["rot"]), "{s:?}");
+        }
     }
 }

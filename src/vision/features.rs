@@ -256,6 +256,24 @@ mod tests {
     }
 
     #[test]
+    fn strokes_are_in_units_of_the_longer_side_from_the_middle() {
+        // The second one is on the border: half of it is in view.
+        let (x, y): (&[f32], &[f32]) = (&[64.0, 0.0], &[25.0, 50.0]);
+        let (tx, ty): (&[f32], &[f32]) = (&[1.0, 0.0], &[0.0, 1.0]);
+        let drawn = rendered(&Elements { x, y, tx, ty, length: &[2.0, 1.0], width: 128, height: 100 });
+        let inside = Stroke { at: [0.0, -0.1953125], along: [1.0, 0.0], length: 2.0 / 128.0 };
+        let border = Stroke { at: [-0.5, 0.0], along: [0.0, 1.0], length: 0.5 / 128.0 };
+        assert_eq!(drawn, [inside, border]);
+        let mut map = ContourMap::new(128, 100);
+        map.x.push(64.0);
+        map.y.push(25.0);
+        map.tx.push(1.0);
+        map.ty.push(0.0);
+        map.strength.push(0.7);
+        assert_eq!(observed(&map), [Stroke { length: 1.0 / 128.0, ..inside }]);
+    }
+
+    #[test]
     fn distances_order_pictures_and_small_movements_are_forgiven() {
         let here = circle(64.0, 64.0, 30.0, 128, 128);
         let q = Query::contours(&here);

@@ -235,6 +235,12 @@ mod tests {
         assert_eq!(decode(&u8s, &Limits::default()).unwrap().data(), [false, true]);
         let u8s = npy::bytes_of(1, "|u1", "False", "(2, 1)", &[200, 1]);
         assert_eq!(decode(&u8s, &Limits::default()).unwrap().data(), [true, false]);
+        let f32s: Vec<u8> = [0.0f32, 0.5, 0.51, 1.0].iter().flat_map(|x| x.to_le_bytes()).collect();
+        let f32s = npy::bytes_of(1, "<f4", "False", "(1, 4)", &f32s);
+        assert_eq!(decode(&f32s, &Limits::default()).unwrap().data(), [false, false, true, true]);
+        let f64s: Vec<u8> = [0.5f64, 0.75].iter().flat_map(|x| x.to_le_bytes()).collect();
+        let f64s = npy::bytes_of(1, "<f8", "False", "(1, 2)", &f64s);
+        assert_eq!(decode(&f64s, &Limits::default()).unwrap().data(), [false, true]);
         let png = |picture: image::DynamicImage| {
             let mut out = std::io::Cursor::new(Vec::new());
             picture.write_to(&mut out, image::ImageFormat::Png).unwrap();

@@ -181,6 +181,16 @@ mod tests {
     }
 
     #[test]
+    fn pictures_have_two_axes_and_at_least_one_pixel() {
+        let size = |shape: &[usize]| NpyArray { shape: shape.to_vec(), data: NpyData::U8(Vec::new()) }.picture_size();
+        assert_eq!(size(&[1, 1]).unwrap(), (1, 1));
+        assert_eq!(size(&[2, 3, 1]).unwrap(), (3, 2));
+        for shape in [&[0, 3][..], &[3, 0], &[0, 0], &[3, 0, 1], &[2, 3, 2], &[2], &[]] {
+            assert!(size(shape).unwrap_err().to_string().contains("two axes"), "{shape:?}");
+        }
+    }
+
+    #[test]
     fn the_report_writer_is_read_back() {
         let bytes = crate::report::npy::f32_array(&[2, 2], [1.0, 2.0, 3.0, 4.0]);
         let a = parse(&bytes).unwrap();

@@ -196,6 +196,11 @@ fn draws_have_the_stated_moments() {
     assert!(make("half_cauchy", &[0.0, 1.0]).mean().is_none());
     assert!(make("cauchy", &[0.0, 1.0]).mean().is_none());
     assert!(make("inv_gamma", &[1.0, 1.0]).mean().is_none() && make("inv_gamma", &[2.0, 1.0]).sd().is_none());
+    // Cut at the mean: the two halves of a normal.
+    for (lo, hi, side) in [(1.0, INF, 1.0), (-INF, 1.0, -1.0)] {
+        let mean = make("truncated_normal", &[1.0, 2.0, lo, hi]).mean().unwrap();
+        assert!((mean - (1.0 + side * 2.0 * (2.0 / PI).sqrt())).abs() < 1e-9, "{mean}");
+    }
     let ratio = make("weibull", &[1e8, 1.0]).sd().unwrap() / (PI / 6f64.sqrt() * 1e-8);
     assert!((ratio - 1.0).abs() < 1e-7, "{ratio}");
 }

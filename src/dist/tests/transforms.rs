@@ -62,6 +62,35 @@ fn there_and_back() {
     }
 }
 
+#[test]
+fn points_at_an_end_or_beyond_are_the_nearest_inside() {
+    let kept = |s: &Support, x: f64| s.from_free_scalar(s.to_free_scalar(x)).0;
+    let (above, below) = (Support::AtLeast { lo: -3.0 }, Support::AtMost { hi: 4.0 });
+    let between = Support::Interval { lo: -2.0, hi: 5.0 };
+    for by in [0.0, 5.0] {
+        assert!((0.0..1e-300).contains(&kept(&Support::Positive, -by)));
+        assert_eq!(kept(&above, -3.0 - by), (-3f64).next_up());
+        assert_eq!(kept(&below, 4.0 + by), 4f64.next_down());
+        assert_eq!(kept(&between, -2.0 - by), (-2f64).next_up());
+        assert_eq!(kept(&between, 5.0 + by), 5f64.next_down());
+    }
+    assert!(kept(&Support::Positive, INF) > 1e300 && kept(&above, INF) > 1e300 && kept(&below, -INF) < -1e300);
+}
+
+#[test]
+fn products_are_made_part_by_part() {
+    let dice = Support::Product(Box::new(Support::Integers { lo: 1, hi: Some(6) }), 3);
+    assert_eq!(dice.from_free(&[]), (Datum::from(vec![1.0; 3]), 0.0));
+    for one in [Support::Simplex(2), Support::Vector(1), Support::Ascending(Box::new(Support::Real), 1)] {
+        let s = Support::Product(Box::new(one.clone()), 2);
+        let (x, jacobian) = s.from_free(&[0.3, -0.8]);
+        let parts = [0.3, -0.8].map(|y| one.from_free(&[y]));
+        assert!(s.contains(&x), "{s:?} {x:?}");
+        assert_eq!(numbers(&x), parts.iter().flat_map(|(x, _)| numbers(x)).collect::<Vec<_>>());
+        assert!((jacobian - parts[0].1 - parts[1].1).abs() < 1e-14);
+    }
+}
+
 /// The coordinates that a density of `s` is by: all numbers, but for the last share of each simplex.
 fn independent(s: &Support, x: &Datum) -> Vec<f64> {
     match (s, x) {

@@ -105,6 +105,21 @@ fn far_tails_are_exact() {
 }
 
 #[test]
+fn tails_of_integers_are_sums() {
+    for (family, p) in DISCRETE {
+        let d = make(family, p);
+        let sum = |from: i32, to: i32| (from..=to).map(|k| d.log_density_num(f64::from(k)).exp()).sum::<f64>();
+        for k in -4..16 {
+            for x in [f64::from(k), f64::from(k) + 0.5] {
+                let tails = d.tails(x).unwrap();
+                close(tails.below.exp(), sum(-9, k), 1e-11);
+                close(tails.above.exp(), sum(k + 1, 400), 1e-11);
+            }
+        }
+    }
+}
+
+#[test]
 fn slopes_are_those_of_differences() {
     for (family, p) in CONTINUOUS.iter().chain(DISCRETE) {
         let discrete = DISCRETE.iter().any(|(f, _)| f == family);

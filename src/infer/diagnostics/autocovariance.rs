@@ -78,4 +78,22 @@ mod tests {
             }
         }
     }
+
+    #[test]
+    fn the_transform_is_that_of_the_definition() {
+        let n = 16;
+        let re: Vec<f64> = (0..n).map(|i| f64::from(i * i % 7) - 2.0).collect();
+        let im: Vec<f64> = (0..n).map(|i| f64::from(i * 5 % 11) - 4.0).collect();
+        let (mut a, mut b) = (re.clone(), im.clone());
+        fourier(&mut a, &mut b);
+        for k in 0..n {
+            let (mut x, mut y) = (0.0, 0.0);
+            for t in 0..n {
+                let (s, c) = libm::sincos(-2.0 * PI * f64::from(k * t) / f64::from(n));
+                x += re[t as usize] * c - im[t as usize] * s;
+                y += re[t as usize] * s + im[t as usize] * c;
+            }
+            assert!((a[k as usize] - x).abs() < 1e-12 && (b[k as usize] - y).abs() < 1e-12, "{k}");
+        }
+    }
 }

@@ -75,5 +75,8 @@ mod tests {
         assert_eq!(modes(&[&x]), [vec![0, 2], vec![1]]);
         let short = vec![vec![1.0, 2.0], vec![9.0, 8.0]];
         assert_eq!(modes(&[&short]), [vec![0, 1]]);
+        // One is enough to say nothing.
+        let uneven = vec![vec![1.0, 2.0], vec![9.0; 60]];
+        assert_eq!(modes(&[&uneven]), [vec![0, 1]]);
     }
 }

@@ -114,3 +114,17 @@ fn next_tolerance(distances: &[f64], present: f64) -> f64 {
     let half = &sorted[..sorted.len().div_ceil(2)];
     half.iter().rev().find(|d| **d < present).copied().unwrap_or(0.0)
 }
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    #[test]
+    fn tolerances_keep_half_and_fall() {
+        assert_eq!(next_tolerance(&[3.0, 1.0, 4.0, 2.0], f64::INFINITY), 2.0);
+        assert_eq!(next_tolerance(&[2.0, 1.0, 2.0, 2.0], 2.0), 1.0);
+        // Nothing is nearer, or nothing is comparable: what remains is the last tolerance.
+        assert_eq!(next_tolerance(&[2.0; 4], 2.0), 0.0);
+        assert_eq!(next_tolerance(&[f64::INFINITY; 4], f64::INFINITY), 0.0);
+    }
+}

@@ -204,7 +204,7 @@ impl Kernel for Drift {
         let mut changes = Vec::with_capacity(targets.len());
         let mut moves = Vec::with_capacity(targets.len());
         let (mut dimensions, mut dimensions_before) = (0, 0);
-        let frees: Vec<_> = targets.iter().map(|t| trace.free(*t)).collect();
+        let frees: Vec<_> = targets.iter().map(|t| trace.free_to_move(*t)).collect();
         let shape = joint.then(|| shape_key(trace, &targets, &frees));
         let dimension: usize = frees.iter().flatten().map(|(y, _)| y.len()).sum();
         let along = shape.and_then(|k| self.shapes.get(&k)).and_then(|s| s.step(&mut rng));
@@ -267,7 +267,7 @@ impl Drift {
     fn learn(&mut self, trace: &mut Trace, at: &At) {
         let selection = self.scope.selection(trace);
         let targets = trace.targets(selection);
-        let frees: Vec<_> = targets.iter().map(|t| trace.free(*t)).collect();
+        let frees: Vec<_> = targets.iter().map(|t| trace.free_to_move(*t)).collect();
         for (t, free) in targets.iter().zip(&frees) {
             if let Some((y, _)) = free {
                 self.spreads.entry(trace.address_hash(*t)).or_default().add(y);

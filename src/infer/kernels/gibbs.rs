@@ -165,3 +165,37 @@ fn sample_log(log: &[f64], weights: &mut Vec<f64>, rng: &mut Stream) -> usize {
     weights.extend(log.iter().map(|l| if *l == max { 1.0 } else { libm::exp(l - max) }));
     rng.weighted(weights, weights.iter().sum())
 }
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+    use crate::infer::Pick;
+    use crate::model::Model;
+    use crate::trace::{ChoiceKind, Selector};
+
+    /// Where all values lead to the same choices, and where one of them has a choice of its own.
+    #[test]
+    fn a_step_is_one_proposal_accepted_where_the_value_changes() {
+        let texts = [
+            "assume k ~ categorical([1, 2, 3]); observe normal(k, 1) = 1;",
+            "assume k ~ categorical([1, 2, 3]); assume m = if k == 0 { x ~ normal(0, 1); x } else { 0.5 * k };
+             observe normal(m, 1) = 1;",
+        ];
+        for text in texts {
+            let mut trace = Model::from_text(text).unwrap().simulate(1, 0).unwrap();
+            let finite = Selector::Kind(ChoiceKind::Finite);
+            let selection = trace.select(&finite);
+            let k = trace.targets(selection)[0];
+            let mut kernel = Gibbs::new(Scope { selector: finite, pick: Pick::One });
+            let mut moves = 0;
+            for step in 0..200 {
+                let before = trace.stored(k);
+                let outcome = kernel.step(&mut trace, &At::new(1, 0, step)).unwrap();
+                let moved = u32::from(trace.stored(k) != before);
+                assert_eq!((outcome.proposals, outcome.accepted, outcome.failed), (1, moved, 0), "{text}, step {step}");
+                moves += moved;
+            }
+            assert!((1..200).contains(&moves), "{text}: {moves}");
+        }
+    }
+}

@@ -158,3 +158,17 @@ fn wide_normals_round_the_circle_are_uniform() {
         assert!((total * TAU / f64::from(n) - 1.0).abs() < 1e-9, "{sd}: {total}");
     }
 }
+
+#[test]
+fn a_scene_whose_choice_has_other_coordinates_is_the_prior() {
+    let t = trace("assume x ~ normal(0, 1); observe normal(x, 1) = 0;");
+    let hash = t.address_hash(t.all_targets()[0]);
+    let with = |last: Latents| {
+        let mut entries = free(&t, &[-1.0, 1.5]);
+        entries.push(last);
+        density(&kernel(entries, &[]), &t, Datum::Num(0.3))
+    };
+    let longer = with([(hash, Latent::Free(vec![0.3, 0.0]))].into_iter().collect());
+    let absent = with([(7, Latent::Free(vec![0.3]))].into_iter().collect());
+    assert_eq!(longer, absent);
+}

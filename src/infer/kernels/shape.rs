@@ -95,4 +95,18 @@ mod tests {
         assert!((moment(1, 1) - 9.0).abs() < 0.45, "{}", moment(1, 1));
         assert!((moment(0, 1) - 2.85).abs() < 0.15, "{}", moment(0, 1));
     }
+
+    /// The covariance of few states in many dimensions would be near to singular.
+    #[test]
+    fn the_first_shape_in_many_dimensions_is_near_that_of_the_states() {
+        let mut rng = StreamKey::new(2, 0, Purpose::KERNEL).stream(0, 0, 0);
+        let mut shape = Shape::new(MOST);
+        while shape.factor.is_none() {
+            let state: Vec<f64> = (0..MOST).map(|_| rng.standard_normal()).collect();
+            shape.add(&state);
+        }
+        let factor = shape.factor.unwrap();
+        let variances = (&factor * factor.transpose()).symmetric_eigenvalues();
+        assert!(variances.min() > 0.3 && variances.max() < 2.3, "{variances}");
+    }
 }

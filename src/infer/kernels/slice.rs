@@ -182,7 +182,7 @@ impl Kernel for Slice {
         for target in targets {
             let mut coordinate = 0;
             // Read anew for each coordinate: the one before has moved.
-            while let Some((y, jacobian)) = trace.free(target).filter(|(y, _)| coordinate < y.len()) {
+            while let Some((y, jacobian)) = trace.free_to_move(target).filter(|(y, _)| coordinate < y.len()) {
                 let key = (trace.address_hash(target), coordinate);
                 let width = self.width(key);
                 let mut line = Line { trace, at, target, y, coordinate, jacobian };

@@ -114,3 +114,18 @@ fn next_power(likelihoods: &[f64], power: f64) -> f64 {
     }
     if low > power { low } else { high }
 }
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    /// Likelihoods so far apart that no power tells them by half of the particles: the next one is above all the same.
+    #[test]
+    fn powers_rise_whatever_the_likelihoods_are() {
+        for power in [0.0, 1e-3, 0.5, 1.0 - 1e-10] {
+            let next = next_power(&[0.0, -1e30, -1e30], power);
+            assert!(next > power && next < 1.0, "{power}: {next}");
+        }
+        assert_eq!(next_power(&[-3.0; 4], 0.2), 1.0);
+    }
+}

@@ -170,3 +170,19 @@ fn between(position: f32, n: usize) -> (usize, usize, f32) {
     let low = p as u32 as usize;
     (low, (low + 1).min(n - 1), p - low as f32)
 }
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    #[test]
+    fn windows_reach_equally_far_to_both_sides() {
+        let parts = |at: usize, reach: f64| overlap(at, reach, 6).collect::<Vec<_>>();
+        assert_eq!(parts(3, 1.0), [(2, 0.5), (3, 1.0), (4, 0.5)]);
+        assert_eq!(parts(2, 1.75), [(0, 0.25), (1, 1.0), (2, 1.0), (3, 1.0), (4, 0.25)]);
+        assert_eq!(parts(2, 0.5), [(2, 1.0)]);
+        // Cut off at the border.
+        assert_eq!(parts(0, 1.0), [(0, 1.0), (1, 0.5)]);
+        assert_eq!(parts(5, 1.0), [(4, 0.5), (5, 1.0)]);
+    }
+}

@@ -178,6 +178,14 @@ mod tests {
     }
 
     #[test]
+    fn sizes_are_positive_and_less_than_a_thousand_million() {
+        let options = KeypointOptions { sd: 1.0, outlier: 0.05, offset: 0.0 };
+        for (width, fits) in [(1e9, false), (999_999_999.0, true), (1e-9, true), (0.0, false), (f64::NAN, false)] {
+            assert_eq!(KeypointLikelihood::new(width, 300.0, &options).is_ok(), fits, "{width}");
+        }
+    }
+
+    #[test]
     fn the_gradient_is_that_of_central_differences() {
         let m = model(1.5, 0.1);
         for joint in [[200.0, 150.0], [203.0, 148.5], [210.0, 170.0], [225.0, 150.0], [260.0, 150.0]] {

@@ -100,6 +100,20 @@ fn draws_have_the_probabilities_that_are_scored() {
     }
 }
 
+#[test]
+fn draws_are_within_tiles_only_where_nothing_else_counts() {
+    let picture = Quantised::new(16, 16, 3, vec![0; 256]).unwrap();
+    let groups = random(256, 3, 31);
+    let draws = |power: f64, tiles: u32, tile_power: f64| {
+        let o = RegionOptions { power, tiles, tile_power, ..GLOBAL };
+        Region::of(&picture, &o).unwrap().simulate(&groups, &mut stream(32))
+    };
+    let whole = draws(1.0, 0, 0.0);
+    assert_eq!(draws(0.3, 4, 0.7), whole);
+    assert_eq!(draws(1.0, 4, 0.0), whole);
+    assert_ne!(draws(0.0, 4, 1.0), whole);
+}
+
 /// Discs of unknown place and radius on 24 x 24 pixels: where the truth lies in exact posteriors of pictures simulated from
 /// it. Chi-square of 10 bins (9 degrees of freedom) for the horizontal place and for the radius.
 fn calibration(simulated: &RegionOptions, scored: &RegionOptions) -> [f64; 2] {

@@ -134,3 +134,35 @@ impl Kernel for Optimize {
         Ok(Outcome::one(moved))
     }
 }
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+    use crate::infer::Pick;
+    use crate::model::Model;
+    use crate::trace::{Draws, Selector};
+
+    /// -2 |y|^2 has the gradient -4 y: one step along an axis shows how steep the hill is in all directions.
+    #[test]
+    fn the_direction_leads_to_the_top_of_a_round_hill() {
+        let past = VecDeque::from([Pair { step: vec![1.0, 0.0], change: vec![4.0, 0.0] }]);
+        assert_eq!(direction(&[8.0, 4.0], &past), [2.0, 1.0]);
+    }
+
+    /// The gradient points across a ridge, where the last steps know the way along it.
+    #[test]
+    fn a_narrow_ridge_takes_few_steps() {
+        let text = "assume a ~ normal(0, 1); assume b ~ normal(0, 1); observe normal(a + b, 0.1) = 1;";
+        let mut trace = Model::from_text(text).unwrap().simulate(1, 0).unwrap();
+        for (address, x) in [("@a", 2.0), ("@b", -1.0)] {
+            trace.set(address, x, Draws::default()).unwrap();
+        }
+        let scope = Scope { selector: Selector::All, pick: Pick::All };
+        Optimize::new(scope, 40).step(&mut trace, &At::new(1, 0, 0)).unwrap();
+        for t in trace.all_targets() {
+            let x = trace.stored(*t).and_then(|x| x.num()).unwrap();
+            // Where a = b and a + 100 (a + b - 1) = 0.
+            assert!((x - 100.0 / 201.0).abs() < 1e-6, "{x}");
+        }
+    }
+}

@@ -64,7 +64,7 @@ impl<'a> System<'a> {
         let mut layout = Layout::new(all);
         point.y.clear();
         for t in all {
-            let Some((own, j)) = trace.free(*t).filter(|(own, _)| !own.is_empty()) else { continue };
+            let Some((own, j)) = trace.free_to_move(*t).filter(|(own, _)| !own.is_empty()) else { continue };
             layout.add(trace, *t, own.len());
             jacobian.add(j);
             point.y.extend(own);

@@ -225,6 +225,22 @@ mod tests {
     }
 
     #[test]
+    fn what_is_left_out_is_as_the_reference_says() {
+        let d = RegionOptions::default();
+        let (tiles, colours) = (f64::from(d.tiles), d.colours as f64);
+        for (name, used) in [
+            ("power", d.power),
+            ("tiles", tiles),
+            ("tile_power", d.tile_power),
+            ("colours", colours),
+            ("shading", d.shading),
+        ] {
+            let arg = TABLE[0].args.iter().find(|a| a.name == name).unwrap();
+            assert_eq!(arg.default.unwrap().parse::<f64>().unwrap(), used, "{name}");
+        }
+    }
+
+    #[test]
     fn contour_maps_and_other_things_are_refused() {
         let l = of(0.0, Groups::Silhouette, &RegionOptions::default());
         let map = Value::object(ImageValue::contours(ContourMap::new(64, 64), None));
