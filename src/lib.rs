@@ -23,6 +23,8 @@ pub mod infer;
 pub mod lang;
 mod model;
 #[doc(hidden)]
+pub mod nn;
+#[doc(hidden)]
 pub mod num;
 mod platform;
 #[doc(hidden)]

@@ -81,7 +81,7 @@ fn doc() {
 
 #[test]
 fn help() {
-    let all: [&[&str]; 14] = [
+    let all: [&[&str]; 15] = [
         &["--help"],
         &["run", "--help"],
         &["evaluate", "--help"],
@@ -90,6 +90,7 @@ fn help() {
         &["check", "--help"],
         &["predict", "--help"],
         &["contours", "--help"],
+        &["detect", "--help"],
         &["doc", "--help"],
         &["repl", "--help"],
         &["fmt", "--help"],
@@ -358,6 +359,32 @@ fn sheets_of_the_prior() {
     f.write("disc.png", png(disc(64, 48, 34.0, 22.0, 15.0)));
     snapshot("contours", &session(&f, &["contours", "disc.png"]));
     assert_eq!(f.files(), ["contours.png", "disc.png"]);
+}
+
+/// People are found, written so that `--keypoints` reads them, and drawn; a network that is none is refused.
+#[cfg(feature = "models")]
+#[test]
+fn people_in_photographs() {
+    let f = Folder::new("detect");
+    let skier = concat!(env!("CARGO_MANIFEST_DIR"), "/examples/images/skier.jpg");
+    std::fs::copy(skier, f.path().join("skier.jpg")).unwrap();
+    f.write("grey.png", png(image::GrayImage::from_pixel(90, 60, image::Luma([128]))));
+    std::fs::create_dir(f.path().join("nets")).unwrap();
+    f.write("nets/pose_landmark_lite.tflite", b"not a network");
+    let mut text = session(&f, &["detect", "skier.jpg", "--overlay", "skier.png"]);
+    text += &session(&f, &["detect", "skier.jpg", "-o", "mediapipe.json", "--format", "mediapipe"]);
+    text += &session(&f, &["detect", "grey.png", "-o", "nobody.json"]);
+    text += &session(&f, &["detect", "grey.png", "--models", "nets"]);
+    text += &session(&f, &["detect", "grey.png", "--models", "."]);
+    text += &session(&f, &["detect", "none.jpg"]);
+    snapshot("detect", &text);
+    for (file, found) in [("people.json", 1), ("mediapipe.json", 1), ("nobody.json", 0)] {
+        let bytes = std::fs::read(f.path().join(file)).unwrap();
+        let people = pcadlang::vision::keypoints::People::parse(&bytes).unwrap();
+        let points = people.pick(None, None).map_or(0, |k| k.in_image(344, 425).points().len());
+        assert_eq!(points > 16, found == 1, "{file}: {points}");
+    }
+    assert!(f.exists("skier.png"));
 }
 
 /// Ctrl-C ends a run; every draw so far is kept, and summed up.

@@ -6,6 +6,9 @@ mod folder;
 #[path = "common/gltf.rs"]
 #[allow(dead_code)]
 mod gltf;
+#[allow(dead_code)]
+#[path = "../src/nn/tests/writer.rs"]
+mod networks;
 #[path = "../fuzz/src/lib.rs"]
 mod targets;
 
@@ -21,7 +24,7 @@ use serde_json::json;
 
 type Target = fn(&[u8]);
 
-const TARGETS: [(&str, Target); 13] = [
+const TARGETS: [(&str, Target); 14] = [
     ("program_text", targets::program_text),
     ("program", targets::program),
     ("obj", targets::obj),
@@ -35,6 +38,7 @@ const TARGETS: [(&str, Target); 13] = [
     ("checkpoint", targets::checkpoint),
     ("keypoints", targets::keypoints),
     ("table", targets::table),
+    ("network", targets::network),
 ];
 
 fn root() -> &'static Path {
@@ -194,6 +198,7 @@ fn seeds_of(target: &str) -> Vec<Vec<u8>> {
             "\u{1}x,y\n1,2.5\n-3e2, \"4\"\"\"\n",
             "\u{1}x;ok\n1;true\n",
         ]),
+        "network" => vec![networks::file(b"TFL3", &networks::small())],
         _ => Vec::new(),
     }
 }
@@ -248,6 +253,7 @@ fn seeds() {
                 "array" => depth::decode(seed, 1.0, &Limits::default()).is_ok(),
                 "camera" => Camera::from_json(text()).is_ok(),
                 "keypoints" => People::parse(seed).is_ok(),
+                "network" => pcadlang::nn::Network::read(seed).is_ok(),
                 "checkpoint" => pcadlang::infer::Checkpoint::from_bytes(seed).is_ok(),
                 _ => true,
             };

@@ -8,6 +8,7 @@ use pcadlang::geom::{FileFrame, UpAxis, gltf as gltf_file, obj as obj_file};
 use pcadlang::infer::draws::{Column, DrawRow, Sink};
 use pcadlang::infer::{Checkpoint, Progress};
 use pcadlang::lang::builtins::data::{Options, load};
+use pcadlang::nn::Network;
 use pcadlang::num::fnv1a;
 use pcadlang::render::Camera;
 use pcadlang::report::checkpoint::SavedChain;
@@ -333,4 +334,17 @@ pub fn keypoints(bytes: &[u8]) {
 pub fn table(bytes: &[u8]) {
     let Some((kind, rest)) = bytes.split_first() else { return };
     data(if kind % 2 == 0 { "json" } else { "csv" }, "x", rest, &[]);
+}
+
+/// A network: what is read runs, if that does not take long.
+pub fn network(bytes: &[u8]) {
+    match Network::read(bytes) {
+        Ok(network) if network.work() < 1 << 20 => {
+            let input = vec![0.5; network.input_shape().iter().product()];
+            let outputs = network.run(input).map(|all| all.len());
+            assert_eq!(outputs, Ok(network.output_shapes().len()));
+        }
+        Ok(_) => {}
+        Err(e) => assert!(!e.to_string().is_empty()),
+    }
 }

@@ -1,5 +1,6 @@
 //! The command line.
 
+use super::detect::Detect;
 use clap::builder::{PossibleValuesParser, TypedValueParser};
 use clap::{Args, Parser, Subcommand, ValueHint};
 use pcadlang::tradeoff::Quality;
@@ -34,6 +35,8 @@ pub enum Command {
     Predict(Predict),
     /// Find the contours of a photograph
     Contours(Contours),
+    /// Find the people in a photograph
+    Detect(Detect),
     /// Explain a built-in, search for some, or list all of them
     Doc(Doc),
     /// Explore a program at a prompt: `:help` there lists what can be done

@@ -5,6 +5,7 @@ mod best;
 mod calibrate;
 mod check;
 mod contours;
+mod detect;
 mod doc;
 mod earlier;
 mod evaluate;
@@ -78,6 +79,7 @@ pub fn main(cli: Cli) -> ExitCode {
         Command::Check(a) => check::check(&a),
         Command::Predict(a) => predict::predict(&a),
         Command::Contours(a) => contours::contours(&a),
+        Command::Detect(a) => detect::detect(&a),
         Command::Doc(a) => doc::doc(&a),
         Command::Repl(a) => repl::repl(&a),
         Command::Fmt(a) => fmt::fmt(&a),

@@ -22,6 +22,7 @@ pub mod mask;
 mod nearest;
 pub mod nms;
 pub mod npy;
+pub mod people;
 pub mod photo;
 pub mod region;
 pub mod resize;

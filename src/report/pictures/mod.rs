@@ -5,11 +5,13 @@
 
 mod dots;
 mod font;
+mod limbs;
 mod sheet;
 mod strokes;
 mod surface;
 
 pub use dots::dots;
+pub use limbs::limbs;
 pub use sheet::{captioned_sheet, contact_sheet};
 pub use strokes::{Strokes, contours};
 pub use surface::{Drawn, frequency, mask, overlay, shaded};

@@ -1,0 +1,95 @@
+//! A network: operators in order, and the tensors between them.
+
+use super::operator::{Operator, Tensor};
+use super::{NetworkError, file};
+use std::collections::HashMap;
+
+/// A network that was read from a file.
+#[derive(Debug)]
+pub struct Network {
+    pub(super) steps: Vec<Step>,
+    /// By tensor.
+    pub(super) shapes: Vec<Vec<usize>>,
+    pub(super) constants: HashMap<usize, Vec<f32>>,
+    pub(super) input: usize,
+    pub(super) outputs: Vec<usize>,
+    /// By tensor: the last step that reads it; `usize::MAX` for outputs.
+    pub(super) last: Vec<usize>,
+    pub(super) work: usize,
+}
+
+/// An operator with the tensors that it reads and the one that it fills.
+#[derive(Debug)]
+pub(super) struct Step {
+    pub operator: Operator,
+    pub inputs: Vec<usize>,
+    pub output: usize,
+}
+
+impl Network {
+    /// The network of a `.tflite` file.
+    ///
+    /// # Errors
+    /// If the file is not of the format, if the network has operators that are not known here, or if it is too large.
+    pub fn read(bytes: &[u8]) -> Result<Network, NetworkError> {
+        file::read(bytes)
+    }
+
+    /// The shape of the input: 1, height, width, channels.
+    pub fn input_shape(&self) -> &[usize] {
+        &self.shapes[self.input]
+    }
+
+    /// The shapes of the outputs, in the file's order.
+    pub fn output_shapes(&self) -> impl ExactSizeIterator<Item = &[usize]> {
+        self.outputs.iter().map(|o| &self.shapes[*o][..])
+    }
+
+    /// About how many multiplications a run takes.
+    pub fn work(&self) -> usize {
+        self.work
+    }
+
+    /// The outputs for an input, in the file's order. Rows of pixels from the top, channels together.
+    ///
+    /// # Errors
+    /// If the input is of another length than its shape says.
+    pub fn run(&self, input: Vec<f32>) -> Result<Vec<Vec<f32>>, NetworkError> {
+        let expected = self.input_shape().iter().product();
+        if input.len() != expected {
+            return Err(NetworkError::Input { expected, got: input.len() });
+        }
+        let mut values: Vec<Option<Vec<f32>>> = vec![None; self.shapes.len()];
+        values[self.input] = Some(input);
+        // Memory that no tensor needs any more.
+        let mut free: Vec<Vec<f32>> = Vec::new();
+        for (i, step) in self.steps.iter().enumerate() {
+            let shape = &self.shapes[step.output];
+            let mut out = reuse(&mut free, shape.iter().product());
+            let tensor = |t: &usize| {
+                let values = values[*t].as_ref().or_else(|| self.constants.get(t));
+                Tensor { shape: &self.shapes[*t], values: values.map_or(&[], |v| v) }
+            };
+            let inputs: Vec<Tensor> = step.inputs.iter().map(tensor).collect();
+            step.operator.run(&inputs, shape, &mut out);
+            values[step.output] = Some(out);
+            for t in step.inputs.iter().filter(|t| self.last[**t] == i) {
+                free.extend(values[*t].take());
+            }
+        }
+        Ok(self.outputs.iter().map(|o| values[*o].clone().unwrap_or_default()).collect())
+    }
+}
+
+/// A list of so many numbers, of any values, out of the smallest that is long enough.
+fn reuse(free: &mut Vec<Vec<f32>>, len: usize) -> Vec<f32> {
+    let fits = free.iter().enumerate().filter(|(_, v)| v.capacity() >= len).min_by_key(|(_, v)| v.capacity());
+    match fits.map(|(i, _)| i) {
+        Some(i) => {
+            let mut v = free.swap_remove(i);
+            v.resize(len, 0.0);
+            v
+        }
+        None => vec![0.0; len],
+    }
+}

@@ -1,0 +1,129 @@
+//! What a network is made of: operators on tensors.
+
+use super::convolution::{Convolution, Depthwise, Transposed};
+use super::resampling::{self, Alignment};
+use super::shape::{Clip, Size, Window};
+
+/// An operator with all that it needs besides its inputs.
+#[derive(Debug)]
+pub(super) enum Operator {
+    Convolution(Convolution),
+    Depthwise(Depthwise),
+    Transposed(Transposed),
+    /// Zeros around a picture: above, left, and before the first channel.
+    Pad([usize; 3]),
+    Pool {
+        window: Window,
+        largest: bool,
+        clip: Clip,
+    },
+    Mean,
+    Resize(Alignment),
+    DepthToSpace(usize),
+    /// Joins tensors along this dimension.
+    Concatenate(usize),
+    /// The same numbers in another shape.
+    Reshape,
+    /// Element by element; the second one may be one number for each channel.
+    Add(Clip),
+    Multiply(Clip),
+    Sigmoid,
+    Relu,
+    HardSwish,
+}
+
+/// A tensor in a run.
+#[derive(Clone, Copy, Debug)]
+pub(super) struct Tensor<'a> {
+    pub shape: &'a [usize],
+    pub values: &'a [f32],
+}
+
+/// 1 / (1 + e^-x).
+pub fn sigmoid(x: f32) -> f32 {
+    1.0 / (1.0 + libm::expf(-x))
+}
+
+impl Operator {
+    /// Fills `out`, of this shape, from the inputs. Shapes are those that were checked when the network was read.
+    pub fn run(&self, inputs: &[Tensor], shape: &[usize], out: &mut [f32]) {
+        let Some(first) = inputs.first() else { return };
+        let pictures = Size::of(first.shape).zip(Size::of(shape));
+        match (self, pictures) {
+            (Operator::Convolution(c), Some((from, to))) => c.run(first.values, from, to, out),
+            (Operator::Depthwise(c), Some((from, to))) => c.run(first.values, from, to, out),
+            (Operator::Transposed(c), Some((from, to))) => c.run(first.values, from, to, out),
+            (Operator::Pad(before), Some((from, to))) => resampling::pad(first.values, from, to, *before, out),
+            (Operator::Pool { window, largest, clip }, Some((from, to))) => {
+                resampling::pool(first.values, from, to, window, *largest, out);
+                clip.apply(out);
+            }
+            (Operator::Resize(alignment), Some((from, to))) => {
+                resampling::resize(first.values, from, to, *alignment, out)
+            }
+            (Operator::DepthToSpace(side), Some((from, to))) => {
+                resampling::depth_to_space(first.values, from, to, *side, out)
+            }
+            (Operator::Mean, _) => {
+                if let Some(from) = Size::of(first.shape) {
+                    resampling::mean(first.values, from, out)
+                }
+            }
+            (Operator::Concatenate(along), _) => concatenate(inputs, *along, out),
+            (Operator::Add(clip), _) => {
+                combine(inputs, out, |a, b| a + b);
+                clip.apply(out);
+            }
+            (Operator::Multiply(clip), _) => {
+                combine(inputs, out, |a, b| a * b);
+                clip.apply(out);
+            }
+            (Operator::Reshape, _) => out.copy_from_slice(first.values),
+            (Operator::Sigmoid, _) => each(first.values, out, sigmoid),
+            (Operator::Relu, _) => each(first.values, out, |x| x.max(0.0)),
+            (Operator::HardSwish, _) => each(first.values, out, |x| x * (x + 3.0).clamp(0.0, 6.0) / 6.0),
+            // Refused when the network was read.
+            (_, None) => {}
+        }
+    }
+
+    /// How many multiplications it takes to fill so many numbers.
+    pub fn work(&self, inputs: &[&[usize]], out: usize) -> usize {
+        let channels = inputs.first().and_then(|s| s.last()).copied().unwrap_or(1);
+        let window = |w: &Window| w.size[0] * w.size[1];
+        match self {
+            Operator::Convolution(c) => out.saturating_mul(window(&c.window) * channels),
+            Operator::Transposed(c) => out.saturating_mul(window(&c.window) * channels),
+            Operator::Depthwise(c) => out.saturating_mul(window(&c.window)),
+            Operator::Pool { window: w, .. } => out.saturating_mul(window(w)),
+            Operator::Mean => inputs.iter().map(|s| s.iter().product::<usize>()).sum(),
+            _ => out,
+        }
+    }
+}
+
+fn each(values: &[f32], out: &mut [f32], f: impl Fn(f32) -> f32) {
+    out.iter_mut().zip(values).for_each(|(o, v)| *o = f(*v));
+}
+
+/// Element by element; the shorter one is repeated.
+fn combine(inputs: &[Tensor], out: &mut [f32], f: impl Fn(f32, f32) -> f32) {
+    let [a, b] = inputs else { return };
+    let (long, short) = if a.values.len() >= b.values.len() { (a, b) } else { (b, a) };
+    for (out, long) in out.chunks_mut(short.values.len()).zip(long.values.chunks(short.values.len())) {
+        out.iter_mut().zip(long.iter().zip(short.values)).for_each(|(o, (x, y))| *o = f(*x, *y));
+    }
+}
+
+fn concatenate(inputs: &[Tensor], along: usize, out: &mut [f32]) {
+    let run = |t: &Tensor| t.shape[along..].iter().product::<usize>();
+    let whole: usize = inputs.iter().map(run).sum();
+    for (i, line) in out.chunks_exact_mut(whole).enumerate() {
+        let mut at = 0;
+        for t in inputs {
+            let n = run(t);
+            line[at..at + n].copy_from_slice(&t.values[i * n..(i + 1) * n]);
+            at += n;
+        }
+    }
+}

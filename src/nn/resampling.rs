@@ -1,0 +1,98 @@
+//! Operators that change a picture's size without weights: padding, pooling, interpolation, channels that become pixels.
+
+use super::shape::{Size, Window};
+
+/// Copies a picture into a larger one, so many rows and columns from its corner; the rest is zero.
+pub(super) fn pad(input: &[f32], from: Size, to: Size, before: [usize; 3], out: &mut [f32]) {
+    out.fill(0.0);
+    for row in 0..from.height {
+        for column in 0..from.width {
+            let pixel = to.pixel_mut(out, row + before[0], column + before[1]);
+            pixel[before[2]..before[2] + from.channels].copy_from_slice(from.pixel(input, row, column));
+        }
+    }
+}
+
+/// The largest value in each window, or the mean of those within the picture.
+pub(super) fn pool(input: &[f32], from: Size, to: Size, window: &Window, largest: bool, out: &mut [f32]) {
+    let before = window.before(from, to);
+    for row in 0..to.height {
+        for column in 0..to.width {
+            let (pixel, mut count) = (to.pixel_mut(out, row, column), 0u16);
+            pixel.fill(if largest { f32::MIN } else { 0.0 });
+            window.each(from, before, (row, column), |_, _, y, x| {
+                count += 1;
+                let values = pixel.iter_mut().zip(from.pixel(input, y, x));
+                values.for_each(|(p, v)| *p = if largest { p.max(*v) } else { *p + v });
+            });
+            if !largest {
+                pixel.iter_mut().for_each(|p| *p /= f32::from(count.max(1)));
+            }
+        }
+    }
+}
+
+/// The mean of each channel.
+pub(super) fn mean(input: &[f32], from: Size, out: &mut [f32]) {
+    out.fill(0.0);
+    for pixel in input.chunks_exact(from.channels) {
+        out.iter_mut().zip(pixel).for_each(|(o, p)| *o += p);
+    }
+    let count = (from.height * from.width) as f32;
+    out.iter_mut().for_each(|o| *o /= count);
+}
+
+/// Where pixels of the output lie in the input.
+#[derive(Clone, Copy, Debug)]
+pub(super) enum Alignment {
+    /// The first pixels lie on each other.
+    First,
+    /// So do the last ones.
+    Corners,
+    /// The pixels' outlines do.
+    HalfPixels,
+}
+
+impl Alignment {
+    /// The two pixels that one of the output lies between, and how far it is from the first.
+    fn between(self, i: usize, from: usize, to: usize) -> (usize, usize, f32) {
+        let scale = match self {
+            Alignment::Corners if to > 1 => (from - 1) as f32 / (to - 1) as f32,
+            _ => from as f32 / to as f32,
+        };
+        let x = match self {
+            Alignment::HalfPixels => (i as f32 + 0.5) * scale - 0.5,
+            _ => i as f32 * scale,
+        };
+        let low = (x.floor().max(0.0) as usize).min(from - 1);
+        (low, (x.ceil().max(0.0) as usize).min(from - 1), x - low as f32)
+    }
+}
+
+/// Interpolates linearly.
+pub(super) fn resize(input: &[f32], from: Size, to: Size, alignment: Alignment, out: &mut [f32]) {
+    for row in 0..to.height {
+        let (top, bottom, fy) = alignment.between(row, from.height, to.height);
+        for column in 0..to.width {
+            let (left, right, fx) = alignment.between(column, from.width, to.width);
+            let (a, b) = (from.pixel(input, top, left), from.pixel(input, top, right));
+            let (c, d) = (from.pixel(input, bottom, left), from.pixel(input, bottom, right));
+            for (j, o) in to.pixel_mut(out, row, column).iter_mut().enumerate() {
+                let (ab, cd) = (a[j] * (1.0 - fx) + b[j] * fx, c[j] * (1.0 - fx) + d[j] * fx);
+                *o = ab * (1.0 - fy) + cd * fy;
+            }
+        }
+    }
+}
+
+/// Lays out the channels of each pixel as a block of `side` x `side` pixels.
+pub(super) fn depth_to_space(input: &[f32], from: Size, to: Size, side: usize, out: &mut [f32]) {
+    for row in 0..from.height {
+        for column in 0..from.width {
+            let parts = from.pixel(input, row, column).chunks_exact(to.channels);
+            for (i, part) in parts.enumerate() {
+                to.pixel_mut(out, row * side + i / side, column * side + i % side).copy_from_slice(part);
+            }
+        }
+    }
+}

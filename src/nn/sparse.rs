@@ -1,0 +1,137 @@
+//! Sparse tensors of TFLite files, laid out densely.
+//!
+//! A tensor of rank n may be cut into blocks; its n outer and the inner dimensions of the blocks are traversed in some order, each
+//! densely or by a list of the indices that there are (compressed sparse rows), down to values (TFLite's `SparsityParameters`).
+
+use super::NetworkError;
+use super::flatbuffer::Table;
+
+/// The dimensions of the table `SparsityParameters`, of `DimensionMetadata`, and where a vector of indices has its kind.
+const ORDER: usize = 0;
+const BLOCK_MAP: usize = 1;
+const DIMENSIONS: usize = 2;
+const FORMAT: usize = 0;
+const DENSE_SIZE: usize = 1;
+const SEGMENTS: usize = 2;
+const INDICES: usize = 4;
+
+fn bad(what: &str) -> NetworkError {
+    NetworkError::Format(format!("a sparse tensor {what}"))
+}
+
+enum Level {
+    Dense(usize),
+    /// The indices of row r are those from `segments[r]` to `segments[r + 1]`.
+    Rows {
+        segments: Vec<usize>,
+        indices: Vec<usize>,
+    },
+}
+
+struct Layout<'a> {
+    shape: &'a [usize],
+    /// By level: the dimension that it walks along, and how far a step leads there.
+    along: Vec<(usize, usize)>,
+    levels: Vec<Level>,
+}
+
+/// The values of a sparse tensor in a dense one of this shape.
+pub(super) fn dense(shape: &[usize], sparsity: &Table, values: &[f32]) -> Result<Vec<f32>, NetworkError> {
+    let layout = Layout::read(shape, sparsity)?;
+    let mut out = vec![0.0; shape.iter().product()];
+    let mut rest = values;
+    layout.walk(0, 0, &mut vec![0; shape.len()], &mut rest, &mut out)?;
+    Ok(out)
+}
+
+impl<'a> Layout<'a> {
+    fn read(shape: &'a [usize], sparsity: &Table) -> Result<Layout<'a>, NetworkError> {
+        let (order, map) = (sparsity.indices(ORDER)?, sparsity.indices(BLOCK_MAP)?);
+        let dimensions = sparsity.tables(DIMENSIONS)?;
+        let mut sorted = order.clone();
+        sorted.sort_unstable();
+        if sorted != (0..shape.len() + map.len()).collect::<Vec<_>>() || dimensions.len() != order.len() {
+            return Err(bad("is traversed in an order that is none"));
+        }
+        // The size of blocks along each dimension; a block's own dimensions are dense.
+        let mut block = vec![1; shape.len()];
+        for (level, which) in order.iter().enumerate().filter(|(_, which)| **which >= shape.len()) {
+            let d =
+                *map.get(which - shape.len()).filter(|d| **d < shape.len()).ok_or_else(|| bad("has wrong blocks"))?;
+            let size = dimensions[level].index(DENSE_SIZE)?;
+            if dimensions[level].u8(FORMAT)? != 0 || block[d] != 1 || size == 0 || shape[d] % size != 0 {
+                return Err(bad("has wrong blocks"));
+            }
+            block[d] = size;
+        }
+        let (mut along, mut levels) = (Vec::new(), Vec::new());
+        for (which, table) in order.iter().zip(&dimensions) {
+            let (d, step, size) = match which.checked_sub(shape.len()) {
+                None => (*which, block[*which], shape[*which] / block[*which]),
+                Some(b) => (map[b], 1, block[map[b]]),
+            };
+            along.push((d, step));
+            levels.push(match table.u8(FORMAT)? {
+                0 if table.index(DENSE_SIZE)? == size => Level::Dense(size),
+                0 => return Err(bad("has a dimension of another size than its shape")),
+                1 => {
+                    let (segments, indices) = (numbers(table, SEGMENTS)?, numbers(table, INDICES)?);
+                    let in_order = segments.windows(2).all(|w| w[0] <= w[1]);
+                    if !in_order
+                        || segments.last().is_none_or(|l| *l > indices.len())
+                        || indices.iter().any(|i| *i >= size)
+                    {
+                        return Err(bad("has indices that lead out of it"));
+                    }
+                    Level::Rows { segments, indices }
+                }
+                _ => return Err(bad("has a dimension of an unknown format")),
+            });
+        }
+        Ok(Layout { shape, along, levels })
+    }
+
+    /// Walks the levels from this one on, in row `row` of it.
+    fn walk(
+        &self,
+        level: usize,
+        row: usize,
+        at: &mut Vec<usize>,
+        values: &mut &[f32],
+        out: &mut [f32],
+    ) -> Result<(), NetworkError> {
+        let Some(kind) = self.levels.get(level) else {
+            let place = at.iter().zip(self.shape).fold(0, |place, (i, n)| place * n + i);
+            let (first, rest) = values.split_first().ok_or_else(|| bad("has fewer values than places"))?;
+            out[place] = *first;
+            *values = rest;
+            return Ok(());
+        };
+        let (d, step) = self.along[level];
+        let mut enter = |i: usize, row: usize| {
+            at[d] += i * step;
+            let done = self.walk(level + 1, row, at, values, out);
+            at[d] -= i * step;
+            done
+        };
+        match kind {
+            Level::Dense(n) => (0..*n).try_for_each(|i| enter(i, row * n + i)),
+            Level::Rows { segments, indices } => {
+                let ends = segments.get(row).zip(segments.get(row + 1));
+                let (start, end) = ends.ok_or_else(|| bad("has fewer rows than places"))?;
+                (*start..*end).try_for_each(|k| enter(indices[k], k))
+            }
+        }
+    }
+}
+
+/// Indices as numbers of 32, 16 or 8 bits.
+fn numbers(table: &Table, field: usize) -> Result<Vec<usize>, NetworkError> {
+    let vector = table.table(field + 1)?.ok_or_else(|| bad("lacks indices"))?;
+    match table.u8(field)? {
+        1 => vector.indices(0),
+        2 => Ok(vector.u16s(0)?.into_iter().map(usize::from).collect()),
+        3 => Ok(vector.bytes(0)?.iter().map(|b| usize::from(*b)).collect()),
+        _ => Err(bad("has indices of an unknown kind")),
+    }
+}

@@ -1,0 +1,146 @@
+//! One person out of several views: which views agree, what they agree on, and what the others say.
+//!
+//! Means over views are bad, since views have several modes (an arm here or there, left and right exchanged). So the view that most others
+//! agree with is looked for, and each landmark is the median over those that agree with it.
+
+use super::landmarks::{NAMED, Seen, View};
+use super::window::Window;
+use super::{Hypothesis, Landmark};
+
+/// Shoulders, elbows, wrists, hips, knees, ankles.
+const LIMBS: [usize; 12] = [11, 12, 13, 14, 15, 16, 23, 24, 25, 26, 27, 28];
+/// Landmarks this far apart, in lengths of the torso, agree by exp(-1/2).
+const NEAR: f64 = 0.3;
+/// Views that agree more than this, 0 to 1, see the same pose.
+const AGREEING: f64 = 0.5;
+
+/// A view with the score and the window of the detection that it comes from.
+#[derive(Clone, Debug)]
+pub(super) struct Run {
+    pub score: f64,
+    pub found: Window,
+    pub view: View,
+}
+
+/// Runs by person: windows about the same place and of about the same size, in the order of their first.
+pub(super) fn by_person(runs: Vec<Run>) -> Vec<Vec<Run>> {
+    let mut people: Vec<Vec<Run>> = Vec::new();
+    for run in runs {
+        let same = people.iter_mut().find(|p| {
+            let (centre, side) = middle(p);
+            let apart = distance(run.found.centre, centre);
+            apart < 0.25 * side.min(run.found.side) && run.found.side < 2.0 * side && side < 2.0 * run.found.side
+        });
+        match same {
+            Some(person) => person.push(run),
+            None => people.push(vec![run]),
+        }
+    }
+    people
+}
+
+/// The mean centre and side of the windows of a person.
+fn middle(runs: &[Run]) -> ([f64; 2], f64) {
+    let n = runs.len().max(1) as f64;
+    let mean = |f: &dyn Fn(&Run) -> f64| runs.iter().map(f).sum::<f64>() / n;
+    ([mean(&|r| r.found.centre[0]), mean(&|r| r.found.centre[1])], mean(&|r| r.found.side))
+}
+
+/// How much a picture of this size is about a person: how often and surely they are seen, how large, how near its middle.
+pub(super) fn prominence(runs: &[Run], width: u32, height: u32) -> f64 {
+    let (centre, side) = middle(runs);
+    let off = libm::hypot(centre[0] / f64::from(width) - 0.5, centre[1] / f64::from(height) - 0.5);
+    let seen: f64 = runs.iter().map(|r| r.score).sum();
+    seen * side / f64::from(width.max(height)) * libm::exp(-2.0 * off)
+}
+
+/// What the views of a person agree on.
+#[derive(Clone, Debug)]
+pub(super) struct Consensus {
+    pub landmarks: [Landmark; NAMED],
+    /// Lengths of the torso in pixels, as views have it in the middle.
+    pub torso: f64,
+    /// Which runs agree, by their place.
+    pub agreeing: Vec<usize>,
+    /// Poses that other views agree on, most views first.
+    pub others: Vec<Hypothesis>,
+}
+
+/// The consensus of some runs, of which there is at least one.
+pub(super) fn consensus(runs: &[Run]) -> Option<Consensus> {
+    let torso = median(runs.iter().map(|r| length(&r.view)).collect())?.max(1e-3);
+    let mut left: Vec<usize> = (0..runs.len()).collect();
+    let (mut first, mut others) = (None, Vec::new());
+    while let Some(best) = most_agreed(runs, &left, torso) {
+        let with = &runs[best].view;
+        let (agreeing, rest): (Vec<usize>, Vec<usize>) =
+            left.iter().partition(|i| **i == best || agreement(&runs[**i].view, with, torso) > AGREEING);
+        let landmarks = medians(runs, &agreeing)?;
+        match first {
+            None => first = Some((landmarks, agreeing)),
+            Some(_) => others.push(Hypothesis { landmarks, views: agreeing.len() }),
+        }
+        left = rest;
+    }
+    let (landmarks, agreeing) = first?;
+    others.sort_by_key(|h| core::cmp::Reverse(h.views));
+    Some(Consensus { landmarks, torso, agreeing, others })
+}
+
+/// The run, among some, that the others agree with most, by how sure they are; of equal ones the first.
+fn most_agreed(runs: &[Run], among: &[usize], torso: f64) -> Option<usize> {
+    let support = |i: usize| -> f64 {
+        let each = |j: &usize| {
+            let other = &runs[*j];
+            agreement(&runs[i].view, &other.view, torso) * other.view.presence * other.score
+        };
+        among.iter().map(each).sum()
+    };
+    let better = |best: Option<(usize, f64)>, i: &usize| {
+        let s = support(*i);
+        if best.is_none_or(|(_, most)| s > most) { Some((*i, s)) } else { best }
+    };
+    among.iter().fold(None, better).map(|(i, _)| i)
+}
+
+/// How far two views see the same pose, 0 to 1.
+fn agreement(a: &View, b: &View, torso: f64) -> f64 {
+    let near = |i: usize| {
+        let d = distance(a.landmarks[i].at, b.landmarks[i].at) / torso / NEAR;
+        libm::exp(-0.5 * d * d)
+    };
+    LIMBS.iter().map(|i| near(*i)).sum::<f64>() / LIMBS.len() as f64
+}
+
+/// The mean of the two ways from a shoulder to the opposite hip.
+fn length(view: &View) -> f64 {
+    let [a, b, c, d] = [11, 24, 12, 23].map(|i| view.landmarks[i].at);
+    0.5 * (distance(a, b) + distance(c, d))
+}
+
+fn distance(a: [f64; 2], b: [f64; 2]) -> f64 {
+    libm::hypot(a[0] - b[0], a[1] - b[1])
+}
+
+fn medians(runs: &[Run], among: &[usize]) -> Option<[Landmark; NAMED]> {
+    let mut out = [Landmark::default(); NAMED];
+    for (k, landmark) in out.iter_mut().enumerate() {
+        let each = |f: &dyn Fn(&Seen) -> f64| median(among.iter().map(|i| f(&runs[*i].view.landmarks[k])).collect());
+        let at = [each(&|s| s.at[0])?, each(&|s| s.at[1])?];
+        let squares = among.iter().map(|i| {
+            let d = distance(runs[*i].view.landmarks[k].at, at);
+            d * d
+        });
+        // Of one coordinate.
+        let spread = libm::sqrt(squares.sum::<f64>() / (2 * among.len()) as f64);
+        let metres = [each(&|s| s.metres[0])?, each(&|s| s.metres[1])?, each(&|s| s.metres[2])?];
+        *landmark = Landmark { at, spread, visibility: each(&|s| s.visibility)?, metres };
+    }
+    Some(out)
+}
+
+/// The middle number, the lower of two.
+fn median(mut xs: Vec<f64>) -> Option<f64> {
+    xs.sort_by(f64::total_cmp);
+    xs.get(xs.len().checked_sub(1)? / 2).copied()
+}
