@@ -87,7 +87,7 @@ impl Support {
     }
 
     /// Whether some part of a value is discrete.
-    pub fn has_discrete_part(&self) -> bool {
+    pub(crate) fn has_discrete_part(&self) -> bool {
         match self {
             Support::Product(one, _) => one.has_discrete_part(),
             Support::Each(all) => all.iter().any(Support::has_discrete_part),

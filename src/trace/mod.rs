@@ -404,7 +404,7 @@ impl Trace {
 
     /// [`Trace::free`] of a choice that moves there can reach in all its parts: `None` also for one that is discrete in part, which a
     /// [`Change::Free`] puts at its least value.
-    pub fn free_to_move(&self, t: Target) -> Option<(Vec<f64>, f64)> {
+    pub(crate) fn free_to_move(&self, t: Target) -> Option<(Vec<f64>, f64)> {
         if self.dist(t)?.stored_support().has_discrete_part() { None } else { self.free(t) }
     }
 
