@@ -94,3 +94,21 @@ fn the_surrogate_does_not_follow_what_is_pending() {
         assert!(value(&disturbed).same(&value(&trace)), "step {i}");
     }
 }
+
+/// While the likelihood is annealed, both stages take it at its power.
+#[test]
+fn both_stages_take_the_likelihood_at_its_power() {
+    let text = "assume x ~ normal(0, 1); observe normal(x, 0.5) = 2 with coarse = normal(x, 0.8) as y;";
+    let mut trace: Trace = Model::from_text(text).unwrap().simulate(1, 0).unwrap();
+    let at = Selector::Address(Pattern::exact(&trace.observations()[0].0));
+    let mut kernel = Delayed::new(Box::new(Drift::new(scope(), Some(1.0))), at, Span::default());
+    let (mut sum, steps) = (0.0, 20_000);
+    for i in 0..steps {
+        kernel.step(&mut trace, &At { power: 0.5, ..At::new(1, 0, i) }).unwrap();
+        let Value::Num(x) = trace.value(trace.all_targets()[0]) else { panic!("no number") };
+        sum += x;
+    }
+    // Of precision 1 about 0 and 0.5 * 4 about 2.
+    let mean = sum / steps as f64;
+    assert!((mean - 4.0 / 3.0).abs() < 0.08, "{mean}");
+}

@@ -140,6 +140,19 @@ fn draws_from_before_are_kept() {
     assert!(begun.elapsed() > Duration::from_secs(2), "nothing was given up");
 }
 
+/// What may draw a picture counts as many operations: it is given up sooner.
+#[test]
+fn observations_that_may_be_slow_are_stopped_sooner() {
+    let stop = Stop::when(Arc::new(AtomicBool::new(true))).after(Duration::ZERO);
+    let limits = Limits { stop, ..Limits::default() };
+    let text =
+        |d: &str| format!("assume x ~ normal(0, 1); let d = normal(x, 1); for i in 0 .. 40 {{ observe {d} = i; }}");
+    let plain = Program::parse(&text("normal(x, 1)")).and_then(|p| p.limits(limits.clone()).compile());
+    plain.and_then(|m| m.simulate(1, 0)).map(drop).unwrap_or_else(|e| panic!("{e}"));
+    let e = error_within(&text("d"), limits);
+    assert!(e.contains("stopped in the middle of an evaluation"), "{e}");
+}
+
 /// A host has a flag of its own, which ends a run as well; what is left can be looked at although the flag is still set.
 #[test]
 fn a_host_may_stop_evaluations_by_a_flag_of_its_own() {

@@ -174,6 +174,23 @@ fn saved_traces_load_bit_for_bit() {
     }
 }
 
+/// A saved choice that the program does not make is refused, by its address.
+#[test]
+fn saved_choices_occur_in_the_program() {
+    for text in ["assume a ~ normal(0, 1); observe normal(a, 1) = 0.5;", PROGRAMS[0].1] {
+        let (model, t) = trace(text, 2);
+        let load = |saved: &serde_json::Value| {
+            let saved = serde_json::from_value(saved.clone()).unwrap();
+            Trace::load(model.code().clone(), model.hash(), &saved, Limits::default()).map_err(|e| e.to_string())
+        };
+        let mut saved = serde_json::to_value(t.save(model.hash())).unwrap();
+        assert!(load(&saved).is_ok(), "{text}");
+        saved["choices"][0]["hash"] = "0000000000000001".into();
+        let e = load(&saved).expect_err(text);
+        assert_eq!(e, "the trace has a choice @a which the program does not make");
+    }
+}
+
 /// Addresses are exactly as the language says.
 #[test]
 fn addresses_are_paths() {
@@ -247,6 +264,26 @@ fn a_change_reruns_only_what_depends_on_it() {
     }
     // The comparison came out equal: what depends on it did not run; nor did anything of b.
     assert!(!ran.iter().any(|r| r.contains("right") || r.contains("b * 3") || r.contains("gate")), "{ran:?}");
+}
+
+/// Who watches sees what a move executes, also where the move could be made without.
+#[test]
+fn moves_are_seen_by_who_watches() {
+    use pcadlang::infer::{At, Gibbs, Kernel, Pick, Scope};
+    let (_, mut t) = trace("assume f ~ flip(0.5); observe normal(if f { 1 } else { 0 }, 1) = 0.5;", 1);
+    let mut kernel = Gibbs::new(Scope { selector: Selector::All, pick: Pick::One });
+    let mut moves = 0;
+    for step in 0..40 {
+        let before = format!("{:?}", t.choices());
+        t.watch();
+        kernel.step(&mut t, &At::new(1, 0, step)).unwrap_or_else(|e| panic!("{e}"));
+        let ran = t.executed();
+        if format!("{:?}", t.choices()) != before {
+            moves += 1;
+            assert!(!ran.is_empty(), "step {step}");
+        }
+    }
+    assert!(moves > 5, "{moves}");
 }
 
 /// With n conditionally independent observations, changing one local choice executes the same few operations at any n.
@@ -412,4 +449,22 @@ fn choices_are_found_by_their_addresses_as_branches_change() {
             assert_eq!(trace.find(&address), Some(t), "step {step} (accepted {accepted}): {address}");
         }
     }
+}
+
+/// What reads a number is not told where it turns into something else: that is an error, never an old value.
+#[test]
+fn a_number_that_turns_into_an_array_is_an_error() {
+    let text = "assume k ~ flip(0.5); assume x ~ normal(if k { [0, 1] } else { 0 }, 1);
+        observe normal(x * [1, 1], 1) = [0.5, 0.7];";
+    let model = Model::from_text(text).unwrap();
+    let is = |t: &Trace, k: bool| t.get("@k").unwrap().same(&pcadlang::Value::Bool(k));
+    let mut number = (0..20).map(|i| model.simulate(1, i).unwrap()).find(|t| is(t, false)).unwrap();
+    let before = number.log_joint();
+    let error = number.set("@k", true, Streams::default()).unwrap_err().to_string();
+    assert!(error.contains("its parameters turned into arrays"), "{error}");
+    assert!(is(&number, false) && number.log_joint() == before);
+    // The other way round all is told.
+    let mut array = (0..20).map(|i| model.simulate(1, i).unwrap()).find(|t| is(t, true)).unwrap();
+    array.set("@k", false, Streams::default()).unwrap();
+    assert_eq!(array.rerun().unwrap().log_joint(), array.log_joint());
 }

@@ -110,3 +110,22 @@ impl Reader<'_, '_> {
         }
     }
 }
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+    use crate::model::Model;
+
+    #[test]
+    fn kernels_within_declared_ones_are_found() {
+        let text = "assume x ~ normal(0, 1); assume y ~ normal(0, 1); observe normal(x + y, 1) = 1;
+             kernel first(s) { drift(@x, s); }
+             kernel both(s) { first(s); mh(@y); }
+             infer { repeat 10 { both(0.5); block(@x); both(2); } }";
+        let model = Model::from_text(text).unwrap();
+        let (mut trace, plan) = (model.simulate(1, 0).unwrap(), model.plan().unwrap().0);
+        let found = selecting(model.code(), &plan, &mut trace);
+        let names: Vec<&str> = found.iter().map(|k| &*k.kernel).collect();
+        assert_eq!(names, ["drift(@x, s)", "mh(@y)", "block(@x)"]);
+    }
+}

@@ -359,3 +359,31 @@ impl Peek {
 fn refs(values: &[Value]) -> SmallVec<[&Value; 4]> {
     values.iter().collect()
 }
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+    use crate::trace::{Change, Draws};
+
+    /// Arrays on the way are not for formulas.
+    #[test]
+    fn weights_through_arrays_are_those_of_updates() {
+        let text = "assume k ~ categorical([1, 2, 3]); factor(-sum([k, 1])); observe normal(sum([k, 0.5]), 1) = 1;";
+        let mut trace = crate::Model::from_text(text).unwrap().simulate(1, 0).unwrap();
+        let target = trace.all_targets()[0];
+        let dist = trace.dist(target).unwrap();
+        let values = dist.support().finite_values().unwrap();
+        let current = values.iter().position(|v| Some(v) == trace.stored(target).as_ref()).unwrap();
+        for power in [1.0, 0.3] {
+            let (mut peek, mut weights) = (Peek::default(), Vec::new());
+            let put = |w| weights.push(w);
+            assert!(trace.weigh_values(target, &dist, (&values, current), &mut peek, power, put).unwrap());
+            assert_eq!(weights.len(), 3);
+            for (value, found) in values.iter().zip(weights) {
+                let update = trace.propose(&[(target, Change::Set(value.clone()))], Draws::default()).unwrap();
+                trace.rollback();
+                assert_eq!(found, Some(update.tempered(power)), "{value:?}");
+            }
+        }
+    }
+}

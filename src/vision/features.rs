@@ -295,6 +295,24 @@ mod tests {
     }
 
     #[test]
+    fn keypoints_that_were_moved_or_made_smaller_or_larger_are_found_again() {
+        let at = |points: [[f64; 2]; 2]| points.map(Some);
+        let q = Query::keypoints(&at([[20.0, 80.0], [90.0, 10.0]]), &[1.0, 1.0], 100, 100);
+        let to = |points: [[f64; 2]; 2]| q.distance(&keypoint_features(&at(points), 100, 100));
+        // As they were; smaller; then also to the right and up; larger.
+        for points in [
+            [[20.0, 80.0], [90.0, 10.0]],
+            [[23.0, 77.0], [86.0, 14.0]],
+            [[28.0, 72.0], [91.0, 9.0]],
+            [[16.7, 83.3], [94.4, 5.6]],
+        ] {
+            assert!(to(points) < 1e-9, "{points:?}: {}", to(points));
+        }
+        // Narrower and taller is something else.
+        assert!(to([[23.0, 83.0], [86.0, 6.0]]) > 1e-3);
+    }
+
+    #[test]
     fn missing_keypoints_do_not_count() {
         let q = Query::keypoints(&[Some([50.0, 50.0]), None], &[1.0, 1.0], 100, 100);
         let there = |second: Option<[f64; 2]>| keypoint_features(&[Some([50.0, 50.0]), second], 100, 100);

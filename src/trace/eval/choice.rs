@@ -42,6 +42,11 @@ impl Graph {
                 self.set_deps(n, deps);
                 return Ok(self.settle_node(code, n));
             }
+            // Marking stops at numbers: what reads this one was not told that it may become something else.
+            let was_told = self.nodes[n as usize].flags & TARGET != 0 || self.may_be_redrawn(code, n);
+            if !moved && !was_told {
+                return Err(self.reformed(code, n));
+            }
             self.retire_choice(code, n);
             if self.nodes[n as usize].flags & HELD != 0 {
                 let mut side: SmallVec<[NodeId; 4]> = SmallVec::new();
@@ -59,6 +64,12 @@ impl Graph {
         node.changed = epoch;
         node.flags &= !TARGET;
         Ok(self.settle_node(code, n))
+    }
+
+    fn reformed(&self, code: &Code, n: NodeId) -> Failure {
+        let message = "the choice is a number, and its parameters turned into arrays".to_owned();
+        let hint = "write two choices, one for each: if c { a ~ normal([0, 1], 1); a } else { b ~ normal(0, 1); b }";
+        self.fail(code, n, FaultKind::Type, message, Some(hint.into()))
     }
 
     /// Whether one of these operands changed in this update.

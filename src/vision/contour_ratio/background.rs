@@ -185,4 +185,14 @@ mod tests {
         assert_eq!(parts(0, 1.0), [(0, 1.0), (1, 0.5)]);
         assert_eq!(parts(5, 1.0), [(4, 0.5), (5, 1.0)]);
     }
+
+    #[test]
+    fn positions_lie_between_two_samples_or_at_the_first_or_last() {
+        assert_eq!(between(2.25, 5), (2, 3, 0.25));
+        assert_eq!(between(0.5, 5), (0, 1, 0.5));
+        assert_eq!(between(3.75, 5), (3, 4, 0.75));
+        assert_eq!(between(-1.0, 5), (0, 1, 0.0));
+        assert_eq!(between(9.0, 5), (4, 4, 0.0));
+        assert_eq!(between(0.3, 1), (0, 0, 0.0));
+    }
 }

@@ -165,4 +165,17 @@ mod tests {
             assert!((x - 100.0 / 201.0).abs() < 1e-6, "{x}");
         }
     }
+
+    /// So little curvature promises so much that no share of it leads up: then the gradient alone does.
+    #[test]
+    fn a_slope_that_is_almost_straight_is_climbed_by_its_gradient() {
+        // Symmetric about 50, and straight on both sides.
+        let text = "assume x ~ flat(); factor(x - 2 * log1p(exp(x - 50)));";
+        let mut trace = Model::from_text(text).unwrap().simulate(1, 0).unwrap();
+        trace.set("@x", 15.0, Draws::default()).unwrap();
+        let scope = Scope { selector: Selector::All, pick: Pick::All };
+        Optimize::new(scope, 60).step(&mut trace, &At::new(1, 0, 0)).unwrap();
+        let x = trace.stored(trace.all_targets()[0]).and_then(|x| x.num()).unwrap();
+        assert!((x - 50.0).abs() < 1e-3, "{x}");
+    }
 }
