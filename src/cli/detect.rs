@@ -47,8 +47,11 @@ pub enum PeopleFormat {
     Mediapipe,
 }
 
-/// Bones as pairs of landmarks: the left side, the right side, what joins them.
-const BONES: [(&[(&str, &str)], [f32; 3]); 3] = [
+/// The landmarks at its ends.
+type Bone = (&'static str, &'static str);
+
+/// The left side, the right side, what joins them; and their colours.
+const BONES: [(&[Bone], [f32; 3]); 3] = [
     (
         &[
             ("l_shoulder", "l_elbow"),

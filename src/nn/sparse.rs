@@ -59,7 +59,7 @@ impl<'a> Layout<'a> {
             let d =
                 *map.get(which - shape.len()).filter(|d| **d < shape.len()).ok_or_else(|| bad("has wrong blocks"))?;
             let size = dimensions[level].index(DENSE_SIZE)?;
-            if dimensions[level].u8(FORMAT)? != 0 || block[d] != 1 || size == 0 || shape[d] % size != 0 {
+            if dimensions[level].u8(FORMAT)? != 0 || block[d] != 1 || size == 0 || !shape[d].is_multiple_of(size) {
                 return Err(bad("has wrong blocks"));
             }
             block[d] = size;
