@@ -106,8 +106,8 @@ fn blamed(messages: &[Value], places: &Places) -> (BTreeSet<usize>, Vec<String>)
 pub fn build(root: &Path, copy: &Path, mutants: &mut Vec<Mutant>) -> Result<Vec<TestProgram>, Failure> {
     let list = copy.join("do-not-compile.txt");
     let mut known = std::fs::read_to_string(&list).unwrap_or_default();
-    mutants.retain(|m| !known.lines().any(|key| key == m.key));
     loop {
+        mutants.retain(|m| !known.lines().any(|key| key == m.key));
         let places = write(root, copy, mutants)?;
         let (ok, messages) = cargo(copy, &["check", "--lib"])?;
         if ok {
@@ -120,11 +120,6 @@ pub fn build(root: &Path, copy: &Path, mutants: &mut Vec<Mutant>) -> Result<Vec<
         println!("{} do not compile", out.len());
         out.iter().for_each(|id| known = format!("{known}{}\n", mutants[*id].key));
         std::fs::write(&list, &known)?;
-        let mut id = 0;
-        mutants.retain(|_| {
-            id += 1;
-            !out.contains(&(id - 1))
-        });
     }
     let (ok, messages) = cargo(copy, &["test", "--release", "--no-run"])?;
     if !ok {

@@ -13,8 +13,6 @@ pub struct Reached {
     pub takes: Duration,
     /// By mutant: the tests whose own threads came by it.
     pub tests: Vec<BTreeSet<String>>,
-    /// By mutant: whether any thread did.
-    pub any: Vec<bool>,
     /// By mutant: whether a thread without a test's name did.
     pub unnamed: Vec<bool>,
 }
@@ -33,12 +31,11 @@ pub fn reached(copy: &Path, tests: &[TestProgram], mutants: usize) -> Result<Vec
         }
         let takes = Duration::from_secs_f64(std::fs::read_to_string(&took)?.trim().parse()?);
         let (test, tests) = (test.clone(), vec![BTreeSet::new(); mutants]);
-        let mut r = Reached { test, takes, tests, any: vec![false; mutants], unnamed: vec![false; mutants] };
+        let mut r = Reached { test, takes, tests, unnamed: vec![false; mutants] };
         for file in std::fs::read_dir(&folder)? {
             for line in std::fs::read_to_string(file?.path())?.lines() {
                 let Some((id, name)) = line.split_once('\t') else { continue };
                 let Some(id) = id.parse::<usize>().ok().filter(|id| *id < mutants) else { continue };
-                r.any[id] = true;
                 if name.is_empty() || name == "main" {
                     r.unnamed[id] = true;
                 } else {
@@ -46,7 +43,7 @@ pub fn reached(copy: &Path, tests: &[TestProgram], mutants: usize) -> Result<Vec
                 }
             }
         }
-        let count = r.any.iter().filter(|a| **a).count();
+        let count = (0..mutants).filter(|id| r.unnamed[*id] || !r.tests[*id].is_empty()).count();
         println!("{}: {:.1} s, comes by {count} mutants", r.test.name, takes.as_secs_f64());
         all.push(r);
     }

@@ -4,8 +4,8 @@ use super::{Failure, files, plain};
 use clap::Args;
 use image::RgbImage;
 use pcadlang::report::pictures::{dots, limbs, picture_size, png};
+use pcadlang::vision::Photo;
 use pcadlang::vision::people::{FindOptions, PeopleFinder, Person, json};
-use pcadlang::vision::{Limits, Photo, photo};
 use std::borrow::Cow;
 use std::path::{Path, PathBuf};
 
@@ -85,8 +85,7 @@ const DETECTION: &str = "pose_detection.tflite";
 
 /// Finds the people in a photograph and writes where they are.
 pub fn detect(a: &Detect) -> Result<(), Failure> {
-    let bytes = files::read(&a.image)?;
-    let photo = photo::decode(&bytes, &Limits::default()).map_err(|e| plain(format!("{}: {e}", a.image.display())))?;
+    let photo = files::photo(&a.image)?;
     let options = FindOptions { views: a.views, most: a.people as usize, ..FindOptions::default() };
     let people = finder(a.models.as_deref())?.find(&photo, &options, a.threads).map_err(|e| plain(e.to_string()))?;
     let size = (photo.width(), photo.height());

@@ -9,7 +9,7 @@ use pcadlang::lang::builtins::scene::ImageValue;
 use pcadlang::lang::value::Value;
 use pcadlang::render::Camera;
 use pcadlang::trace::Limits as Bounds;
-use pcadlang::vision::{ContourMap, Limits, Photo, photo};
+use pcadlang::vision::{ContourMap, Photo};
 use std::path::Path;
 
 /// Opens the program, with its parameters and camera.
@@ -43,7 +43,7 @@ pub fn observe(mut program: Program, job: &Job) -> Result<(Program, Option<Photo
         let kind = program.interface().data.iter().find(|d| d.name == name).and_then(|d| d.ty.clone());
         match kind.as_deref() {
             Some("image") => {
-                let photo = decode(Path::new(&path))?;
+                let photo = files::photo(Path::new(&path))?;
                 program = program.observe(&name, Value::object(ImageValue::photo(photo.clone())));
                 stem = Path::new(&path).file_stem().and_then(|s| s.to_str()).map(str::to_owned);
                 image = Some((name, photo));
@@ -70,7 +70,7 @@ pub fn observe(mut program: Program, job: &Job) -> Result<(Program, Option<Photo
         program = program.observe(&name, found.map_err(|f| Failure::Plain(f.message, f.hint))?);
     }
     if let Some(path) = &job.observe_contours {
-        let map = ContourMap::from_image(&DynamicImage::from(decode(path)?.rgb().clone()).to_luma8());
+        let map = ContourMap::from_image(&DynamicImage::from(files::photo(path)?.rgb().clone()).to_luma8());
         let name = match &image {
             Some((name, _)) => name.clone(),
             None => only(&program, "image", "--observe")?,
@@ -103,11 +103,6 @@ fn part(kind: &str, called: &str, file: &str, id: &str) -> Result<Value, Failure
     let alone = |other: &str| Err(format!("{called} names {other}, but an entry of a file has no files beside it"));
     data::load(kind, called, found.to_string().as_bytes(), &data::Options::default(), &alone)
         .map_err(|e| Failure::Plain(e.message, e.hint))
-}
-
-fn decode(path: &Path) -> Result<Photo, Failure> {
-    let bytes = files::read(path)?;
-    photo::decode(&bytes, &Limits::default()).map_err(|e| plain(format!("{}: {e}", path.display())))
 }
 
 /// Whether a text can be the name of a `data` item.

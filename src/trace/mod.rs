@@ -41,7 +41,7 @@ pub use propose::{Change, Constraint, Draws, Weight};
 pub use save::{SaveError, SavedTrace};
 pub use select::{ChoiceKind, Pattern, PatternSegment, Selector};
 
-use crate::dist::{Datum, Dist};
+use crate::dist::{Datum, Dist, Support};
 use crate::lang::code::{Code, DistSpec, Op, Operand};
 pub use crate::lang::error::RunError;
 use crate::lang::value::{Likelihood, Located, Value};
@@ -392,8 +392,12 @@ impl Trace {
     /// Where a continuous choice is in the unconstrained space, and the log Jacobian of the transform there: what a
     /// [`Change::Free`] starts from. `None` for a discrete one.
     pub fn free(&self, t: Target) -> Option<(Vec<f64>, f64)> {
+        self.free_unless(t, Support::is_discrete)
+    }
+
+    fn free_unless(&self, t: Target, kept: impl Fn(&Support) -> bool) -> Option<(Vec<f64>, f64)> {
         let (support, stored) = (self.dist(t)?.stored_support(), self.stored(t)?);
-        if support.is_discrete() {
+        if kept(&support) {
             return None;
         }
         let mut y = Vec::with_capacity(support.free_dim());
@@ -405,7 +409,7 @@ impl Trace {
     /// [`Trace::free`] of a choice that moves there can reach in all its parts: `None` also for one that is discrete in part, which a
     /// [`Change::Free`] puts at its least value.
     pub(crate) fn free_to_move(&self, t: Target) -> Option<(Vec<f64>, f64)> {
-        if self.dist(t)?.stored_support().has_discrete_part() { None } else { self.free(t) }
+        self.free_unless(t, Support::has_discrete_part)
     }
 
     /// The distribution a choice now has.
