@@ -213,12 +213,7 @@ fn a_bank_of_bodies_is_searched_by_keypoints() {
         let features = bank.features(i).unwrap();
         assert_eq!(features.len(), 2 * names.len());
         let pixels = |x: f32| f64::from(x) * 64.0 + 32.0;
-        let point = |(n, at): (&String, &[f32])| Keypoint {
-            name: n.as_str().into(),
-            x: pixels(at[0]),
-            y: pixels(at[1]),
-            confidence: 0.8,
-        };
+        let point = |(n, at): (&String, &[f32])| Keypoint::new(n.as_str(), [pixels(at[0]), pixels(at[1])], 0.8);
         let seen: Vec<Keypoint> = names.iter().zip(features.chunks(2)).map(point).step_by(2).collect();
         let seen = Value::object(KeypointsValue(Keypoints::new(seen).unwrap()));
         let photo = Value::object(ImageValue::contours(line(), None));

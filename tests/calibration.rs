@@ -155,7 +155,7 @@ fn scenes() -> Vec<(&'static str, Model)> {
     let mut depths = vec![f32::INFINITY; 256];
     depths[7] = f32::NAN;
     let depth = Value::object(DepthValue::new(DepthMap::new(16, 16, depths).unwrap()));
-    let point = |name: &str| Keypoint { name: Arc::from(name), x: 8.0, y: 8.0, confidence: 0.6 };
+    let point = |name: &str| Keypoint::new(name, [8.0, 8.0], 0.6);
     let points = Keypoints::new(["nose", "l_ankle"].map(point).to_vec()).unwrap().in_image(16, 16);
     let points = Value::object(KeypointsValue(points));
     let grey = |x: u32, y: u32| image::Rgb([((x * 7 + y * 11) % 4 * 60) as u8; 3]);

@@ -7,7 +7,7 @@ use folder::{Folder, disc, png};
 use pcadlang::lang::builtins::scene::{ImageValue, KeypointsValue};
 use pcadlang::lang::value::Value;
 use pcadlang::vision::Photo;
-use pcadlang::vision::keypoints::{Keypoint, KeypointLikelihood, KeypointOptions, Keypoints, People};
+use pcadlang::vision::keypoints::{Detection, Keypoint, KeypointLikelihood, KeypointOptions, Keypoints, People};
 use pcadlang::{Model, Program, RunOptions};
 use std::sync::Arc;
 
@@ -70,13 +70,14 @@ fn programs_read_landmarks() {
 fn the_likelihood_is_that_of_the_projected_landmarks() {
     // The default camera shows 4.4 units over 440 pixels at its own depth of 8.
     let m = model(Some("{\"nose\": [250, 20], \"l_ankle\": [230, 205, 0.25], \"r_ear\": [5, 5]}"));
-    let by = KeypointLikelihood::new(440.0, 220.0, &KeypointOptions::default()).unwrap();
+    let by = KeypointLikelihood::new(440.0, 220.0, 0.0, &KeypointOptions::default()).unwrap();
     for seed in 0..5 {
         let t = m.simulate(seed, 0).unwrap();
         let find = |n: &str| t.choices().into_iter().find(|(a, ..)| a.to_string().contains(n)).unwrap().1;
         let (Value::Num(x), Value::Num(y)) = (find("x"), find("y")) else { panic!("two numbers") };
         let at = |dy: f64| Some([220.0 + 100.0 * x, 110.0 - 100.0 * (y + dy)]);
-        let expected = by.log_density([250.0, 20.0], 1.0, at(1.0)) + by.log_density([230.0, 205.0], 0.25, at(-1.0));
+        let expected = by.log_density(&Detection::new([250.0, 20.0], 1.0), at(1.0))
+            + by.log_density(&Detection::new([230.0, 205.0], 0.25), at(-1.0));
         assert!((t.log_likelihood() - expected).abs() < 1e-9, "{} {expected}", t.log_likelihood());
     }
 }
@@ -89,7 +90,7 @@ fn pixels_shares_and_other_sizes_of_the_picture_agree() {
         p.compile().unwrap().simulate(3, 0).unwrap().log_likelihood()
     };
     let of = |joints: [(&str, f64, f64); 2]| {
-        let point = |(n, x, y): (&str, f64, f64)| Keypoint { name: Arc::from(n), x, y, confidence: 0.75 };
+        let point = |(n, x, y): (&str, f64, f64)| Keypoint::new(n, [x, y], 0.75);
         Keypoints::new(joints.map(point).to_vec()).unwrap()
     };
     let pixels = likelihood(of([("nose", 250.0, 20.0), ("l_ankle", 230.0, 205.0)]));

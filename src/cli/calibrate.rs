@@ -1,7 +1,7 @@
 //! `pcadlang check --sbc` and `--geweke`: whether a program's plan draws from its posterior. The statistics are the library's
 //! ([`pcadlang::infer::calibration`]); here is what is run, and what is said of it.
 
-use super::args::{Check, Given, Job, Sampling};
+use super::args::{Check, Given, Job, Sampling, Who};
 use super::job::{Interrupt, machine_threads};
 use super::progress::{self, Ending};
 use super::{Failure, given, plain};
@@ -53,7 +53,13 @@ pub fn calibrate(a: &Check) -> Result<(), Failure> {
 fn job(a: &Check, path: &str) -> Job {
     Job {
         features_from: None,
-        given: Given { program: path.to_owned(), sets: a.sets.clone(), camera: None, allowed: a.allowed.clone() },
+        given: Given {
+            program: path.to_owned(),
+            sets: a.sets.clone(),
+            camera: None,
+            who: Who::default(),
+            allowed: a.allowed.clone(),
+        },
         observe: a.observe.clone(),
         observe_contours: None,
         keypoints: None,

@@ -5,7 +5,7 @@ use clap::Args;
 use image::RgbImage;
 use pcadlang::report::pictures::{dots, limbs, picture_size, png};
 use pcadlang::vision::Photo;
-use pcadlang::vision::people::{FindOptions, PeopleFinder, Person, json};
+use pcadlang::vision::people::{FindOptions, PeopleFinder, Person, json, networks};
 use std::borrow::Cow;
 use std::path::{Path, PathBuf};
 
@@ -129,14 +129,16 @@ fn finder(folder: Option<&Path>) -> Result<PeopleFinder, Failure> {
     PeopleFinder::new(&detection, &landmarks).map_err(|e| plain(format!("{from}: {e}")))
 }
 
-#[cfg(feature = "models")]
 fn shipped() -> Result<(&'static [u8], &'static [u8]), Failure> {
-    Ok((pcadlang_models::DETECTION, pcadlang_models::LANDMARKS))
+    networks::files().map_err(plain)
 }
 
-#[cfg(not(feature = "models"))]
-fn shipped() -> Result<(&'static [u8], &'static [u8]), Failure> {
-    Err(plain("this build has no networks in it (feature `models`); name a folder with them: --models DIR"))
+/// Has this process find people with the networks of a folder.
+pub fn choose(folder: Option<&Path>) -> Result<(), Failure> {
+    if let Some(folder) = folder {
+        networks::choose(finder(Some(folder))?);
+    }
+    Ok(())
 }
 
 fn found(people: &[Person]) -> String {

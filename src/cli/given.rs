@@ -22,6 +22,13 @@ pub fn program(given: &Given, quiet: bool) -> Result<Program, Failure> {
     }
     let limits = given.allowed.limits.iter().try_fold(Bounds::default(), |l, (name, n)| l.with(name, *n));
     program = program.limits(limits.map_err(plain)?);
+    super::detect::choose(given.who.models.as_deref())?;
+    if let Some(n) = given.who.person {
+        program = program.set("person", &n.to_string());
+    }
+    if let Some([x, y, w, h]) = given.who.near {
+        program = program.set("near", &format!("[{x}, {y}, {w}, {h}]"));
+    }
     for (name, value) in &given.sets {
         program = program.set(name, value);
     }

@@ -127,6 +127,7 @@ mod tests {
             program: "x.pcad".into(),
             sets: vec![("size".into(), "64".into())],
             camera: None,
+            who: Default::default(),
             allowed: Default::default(),
         };
         Job::of(given, Sampling { quality, time: time.map(Duration::from_secs_f64), ..Sampling::default() })

@@ -4,6 +4,7 @@ use super::points::Points;
 use super::table::agree;
 use pcadlang::rng::{Purpose, StreamKey};
 use pcadlang::vision::chamfer::Mode;
+use pcadlang::vision::keypoints::Detection;
 use pcadlang::vision::{
     Chamfer, ChamferOptions, ContourDetector, ContourMap, ContourRatio, ContourRatioOptions, DepthLikelihood, DepthMap,
     Elements, GradientDetector, KeypointLikelihood, KeypointOptions, Mask, MaskLikelihood, Photo, Region,
@@ -231,12 +232,13 @@ fn depths_masks_and_keypoints_score_anything() {
         points.check(DepthLikelihood::new(&observed, 1.0, bad, (0.0, 1e38)).is_err(), || format!("outliers {bad}"));
     }
     for sd in [1e-300, 1e-6, 1.0, 1e6, 1e8] {
-        let l = KeypointLikelihood::new(640.0, 480.0, &KeypointOptions { sd, ..KeypointOptions::default() }).unwrap();
+        let l = KeypointLikelihood::new(640.0, 480.0, 0.0, &KeypointOptions { sd, ..KeypointOptions::default() }).unwrap();
         for c in [0.0, 1e-300, 320.0, -1e150, 1e300, f64::MAX, f64::INFINITY, f64::NAN] {
             for confidence in [0.0, 1e-300, 1.0, 7.0, f64::NAN] {
-                let p = l.log_density([320.0, 240.0], confidence, Some([c, 240.0]));
-                let g = l.gradient([320.0, 240.0], confidence, [c, 240.0]);
-                let (at, variance) = l.located([320.0, 240.0], confidence, [c, 240.0]);
+                let seen = Detection::new([320.0, 240.0], confidence).or([([1e9, -1e300], 1e-300)].into_iter());
+                let p = l.log_density(&seen, Some([c, 240.0]));
+                let g = l.gradient(&seen, [c, 240.0]);
+                let (at, variance) = l.located(&seen, [c, 240.0]);
                 let right = p.is_finite() && g.iter().all(|g| !g.is_nan());
                 let right = right && (!c.is_finite() || !at[0].is_nan() && !variance.is_nan());
                 points.check(right, || {

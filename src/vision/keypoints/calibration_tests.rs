@@ -1,7 +1,7 @@
 //! Simulation-based calibration (Talts et al. 2018): of data drawn from the model, the quantile of the truth in the posterior is
 //! uniform. The model is a figure of eight joints, moved and scaled; its posterior is summed on a grid.
 
-use super::{KeypointLikelihood, KeypointOptions};
+use super::{Detection, KeypointLikelihood, KeypointOptions};
 use crate::rng::{Purpose, Stream, StreamKey};
 
 const JOINTS: [[f64; 2]; 8] =
@@ -40,8 +40,15 @@ fn quantile(weights: &[f64], truth: usize, rng: &mut Stream) -> f64 {
 }
 
 /// Chi-square of the quantiles of shift and scale over 400 data sets.
-fn chi_squares(drawn: &KeypointOptions, assumed: &KeypointOptions, missing: f64, sure: bool) -> [f64; 2] {
-    let model = |o| KeypointLikelihood::new(640.0, 480.0, o).unwrap();
+/// `minds`: the weights of further places that the detector is not sure about.
+fn chi_squares(
+    drawn: &KeypointOptions,
+    assumed: &KeypointOptions,
+    missing: f64,
+    sure: bool,
+    minds: &[f64],
+) -> [f64; 2] {
+    let model = |o| KeypointLikelihood::new(640.0, 480.0, 0.0, o).unwrap();
     let (from, to) = (model(drawn), model(assumed));
     let (p, q): (Vec<f64>, Vec<f64>) =
         ((0..SHIFTS).map(|i| prior(i, SHIFTS)).collect(), (0..SCALES).map(|i| prior(i, SCALES)).collect());
@@ -53,13 +60,15 @@ fn chi_squares(drawn: &KeypointOptions, assumed: &KeypointOptions, missing: f64,
         let mut seen = Vec::new();
         for k in 0..JOINTS.len() {
             let confidence = if sure { 1.0 } else { rng.uniform() };
-            let z = from.sample(confidence, Some(joint(k, truth.0, truth.1)), &mut rng);
+            let others = |z: &[[f64; 2]]| z.iter().copied().zip(minds.iter().copied()).collect::<Vec<_>>();
+            let blank = Detection::new([0.0; 2], confidence).or(minds.iter().map(|w| ([0.0; 2], *w)));
+            let z = from.sample(&blank, Some(joint(k, truth.0, truth.1)), &mut rng);
             if rng.uniform() >= missing {
-                seen.push((k, z, confidence));
+                seen.push((k, Detection::new(z[0], confidence).or(others(&z[1..]).into_iter())));
             }
         }
         let log = |i: usize, j: usize| -> f64 {
-            seen.iter().map(|(k, z, c)| to.log_density(*z, *c, Some(joint(*k, i, j)))).sum()
+            seen.iter().map(|(k, z)| to.log_density(z, Some(joint(*k, i, j)))).sum()
         };
         let mut posterior = vec![0.0; SHIFTS * SCALES];
         let mut most = f64::NEG_INFINITY;
@@ -82,22 +91,24 @@ fn chi_squares(drawn: &KeypointOptions, assumed: &KeypointOptions, missing: f64,
 }
 
 fn options(sd: f64, outlier: f64) -> KeypointOptions {
-    KeypointOptions { sd, outlier, offset: 0.0 }
+    KeypointOptions { sd, outlier, ..KeypointOptions::default() }
 }
 
 #[test]
 fn quantiles_of_the_truth_are_uniform() {
     for (outlier, missing, sure) in [(1e-9, 0.0, true), (0.3, 0.0, true), (0.1, 0.4, true), (0.2, 0.3, false)] {
         let o = options(1.5, outlier);
-        let chi = chi_squares(&o, &o, missing, sure);
-        assert!(chi.iter().all(|c| *c < CRITICAL), "{outlier} {missing} {chi:?}");
+        for minds in [&[][..], &[0.5], &[1.0, 0.25]] {
+            let chi = chi_squares(&o, &o, missing, sure, minds);
+            assert!(chi.iter().all(|c| *c < CRITICAL), "{outlier} {missing} {minds:?} {chi:?}");
+        }
     }
 }
 
 #[test]
 fn a_wrong_model_is_found_out() {
-    let chi = chi_squares(&options(1.5, 0.1), &options(0.75, 0.1), 0.0, true);
+    let chi = chi_squares(&options(1.5, 0.1), &options(0.75, 0.1), 0.0, true, &[]);
     assert!(chi.iter().all(|c| *c > CRITICAL), "too small a spread: {chi:?}");
-    let chi = chi_squares(&options(1.5, 0.4), &options(1.5, 1e-100), 0.0, true);
+    let chi = chi_squares(&options(1.5, 0.4), &options(1.5, 1e-100), 0.0, true, &[]);
     assert!(chi.iter().all(|c| *c > CRITICAL), "no outliers: {chi:?}");
 }

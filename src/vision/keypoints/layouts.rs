@@ -95,7 +95,7 @@ fn named(all: &Node) -> Result<Keypoints, KeypointsError> {
             return Err(n.wrong(&format!("given once: there is another spelling of `{name}`")));
         }
         let (x, y) = (x.number("a number of pixels")?, y.number("a number of pixels")?);
-        points.push(Keypoint { name, x, y, confidence });
+        points.push(Keypoint::new(name, [x, y], confidence));
     }
     Keypoints::new(points)
 }
@@ -121,7 +121,7 @@ fn triples(all: &Node, names: Option<&[String]>) -> Result<Keypoints, KeypointsE
         }
         if v > 0.0 {
             let name = names.and_then(|n| n.get(i)).map_or(COCO.get(i).copied().unwrap_or_default(), String::as_str);
-            points.push(Keypoint { name: Arc::from(usual(name)), x, y, confidence: v.min(1.0) });
+            points.push(Keypoint::new(&*usual(name), [x, y], v.min(1.0)));
         }
     }
     Keypoints::new(points)
@@ -209,7 +209,7 @@ fn landmarks(list: &Node) -> Result<Keypoints, KeypointsError> {
             None => Err(n.wrong("a landmark {\"x\": …, \"y\": …, \"visibility\": …}")),
         };
         let confidence = n.get("visibility").map_or(Ok(1.0), |c| confidence(&c))?;
-        points.push(Keypoint { name: Arc::from(name), x: coordinate("x")?, y: coordinate("y")?, confidence });
+        points.push(Keypoint::new(name, [coordinate("x")?, coordinate("y")?], confidence));
     }
     Keypoints::new(points).map(Keypoints::into_normalised)
 }

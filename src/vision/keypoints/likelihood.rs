@@ -3,31 +3,70 @@
 //! Pure arithmetic on positions in pixels. A detection `z` of a joint at `p` has the density
 //! `(1 - e) N(z; p, s^2 I) + e / area` with `e = 1 - c (1 - outlier)` for a detector's confidence `c`: certain detections are
 //! off with the probability `outlier`, worthless ones tell nothing. `s^2 = sd^2 + offset^2`: the model's joint may be off, too, and
-//! where the joint really is then lies between it and the detection. Invariant: finite and never NaN, as `e > 0`.
+//! where the joint really is then lies between it and the detection. A detector that is of several minds gives several places
+//! `z_m` with shares `w_m`, of which one is meant and the others are anywhere:
+//! `((1 - e) sum_m w_m N(z_m; p, s^2 I) + e / area) / area^(M - 1)`. Invariant: finite and never NaN, as `e > 0`.
 
 use crate::rng::Stream;
 use crate::vision::VisionError;
+use smallvec::{SmallVec, smallvec};
+
+/// What the spreads of an error model are given in.
+#[derive(Clone, Copy, Debug, Default, PartialEq, Eq)]
+pub enum Unit {
+    /// Percent of the image's diagonal.
+    #[default]
+    Diagonal,
+    /// Lengths of the person's torso.
+    Torso,
+}
 
 /// The error model.
 #[derive(Clone, Debug, PartialEq)]
 pub struct KeypointOptions {
-    /// The standard deviation of a good detection along each axis, in percent of the image's diagonal; positive.
+    /// The standard deviation of a good detection along each axis; positive.
     pub sd: f64,
     /// The probability that a detection of full confidence is off; strictly between 0 and 1.
     pub outlier: f64,
-    /// How far the joint may be from where the model has it, as a standard deviation along each axis, in percent of the
-    /// diagonal; not negative.
+    /// How far the joint may be from where the model has it, as a standard deviation along each axis; not negative.
     pub offset: f64,
+    /// What these are given in.
+    pub unit: Unit,
 }
 
 impl Default for KeypointOptions {
     fn default() -> Self {
-        KeypointOptions { sd: 1.5, outlier: 0.05, offset: 0.0 }
+        KeypointOptions { sd: 1.5, outlier: 0.05, offset: 0.0, unit: Unit::Diagonal }
     }
 }
 
-/// The error model for one size of image. Positions are in its pixels, confidences in 0..=1 (others count as the nearest of
-/// those). Its density integrates to 1 as far as joints lie inside the image, which is where outliers are.
+/// Where a joint was detected, in pixels.
+#[derive(Clone, Debug, PartialEq)]
+pub struct Detection {
+    /// The places and their shares, which sum to 1: at least one.
+    places: SmallVec<[([f64; 2], f64); 3]>,
+    /// How sure the detector is, 0 to 1; others count as the nearest of those.
+    pub confidence: f64,
+}
+
+impl Detection {
+    /// At one place.
+    pub fn new(at: [f64; 2], confidence: f64) -> Self {
+        Detection { places: smallvec![(at, 1.0)], confidence }
+    }
+
+    /// At one place, or at others with positive weights in proportion to its own, which is 1.
+    #[must_use]
+    pub fn or(mut self, others: impl Iterator<Item = ([f64; 2], f64)>) -> Self {
+        self.places.extend(others);
+        let sum: f64 = self.places.iter().map(|p| p.1).sum();
+        self.places.iter_mut().for_each(|p| p.1 /= sum);
+        self
+    }
+}
+
+/// The error model for one size of image. Positions are in its pixels. Its density integrates to 1 as far as joints lie inside the
+/// image, which is where outliers are.
 #[derive(Clone, Debug)]
 pub struct KeypointLikelihood {
     width: f64,
@@ -42,22 +81,25 @@ pub struct KeypointLikelihood {
 }
 
 impl KeypointLikelihood {
-    /// The model for an image of this size in pixels.
+    /// The model for an image of this size and a torso of this length, all in pixels.
     ///
     /// # Errors
-    /// If a side or an option is outside its range.
-    pub fn new(width: f64, height: f64, options: &KeypointOptions) -> Result<Self, VisionError> {
+    /// If a side or an option is outside its range; a torso only where it is the unit.
+    pub fn new(width: f64, height: f64, torso: f64, options: &KeypointOptions) -> Result<Self, VisionError> {
         let positive = |name, value: f64| match value > 0.0 && value < 1e9 {
             true => Ok(value),
             false => Err(VisionError::Range { name, rule: "positive and less than 1e9", value }),
         };
         let (width, height) = (positive("width", width)?, positive("height", height)?);
-        let percent = (width * width + height * height).sqrt() / 100.0;
+        let unit = match options.unit {
+            Unit::Diagonal => (width * width + height * height).sqrt() / 100.0,
+            Unit::Torso => positive("torso", torso)?,
+        };
         let offset = match options.offset {
             0.0 => 0.0,
-            o => positive("offset", o)? * percent,
+            o => positive("offset", o)? * unit,
         };
-        let own = positive("sd", options.sd)? * percent;
+        let own = positive("sd", options.sd)? * unit;
         let sd = (own * own + offset * offset).sqrt();
         // Whose square is still a number.
         let sd = sd.max(1e-100);
@@ -81,56 +123,91 @@ impl KeypointLikelihood {
         1.0 - confidence * (1.0 - self.outlier)
     }
 
-    /// The logs of the two parts of the density.
-    fn parts(&self, seen: [f64; 2], confidence: f64, joint: Option<[f64; 2]>) -> (f64, f64) {
-        let e = self.outlier(confidence);
+    /// The logs of the parts of the density, but for the places that are not meant: of each place, and of none.
+    fn parts(&self, seen: &Detection, joint: Option<[f64; 2]>) -> (SmallVec<[f64; 3]>, f64) {
+        let e = self.outlier(seen.confidence);
         let off = libm::log(e) - self.log_area;
-        let Some([x, y]) = joint.filter(|j| j.iter().all(|c| c.is_finite())) else { return (f64::NEG_INFINITY, off) };
-        let (dx, dy) = ((seen[0] - x) / self.sd, (seen[1] - y) / self.sd);
-        (libm::log1p(-e) + self.log_peak - 0.5 * (dx * dx + dy * dy), off)
+        let Some([x, y]) = joint.filter(|j| j.iter().all(|c| c.is_finite())) else {
+            return (seen.places.iter().map(|_| f64::NEG_INFINITY).collect(), off);
+        };
+        let near = |(at, share): &([f64; 2], f64)| {
+            let (dx, dy) = ((at[0] - x) / self.sd, (at[1] - y) / self.sd);
+            libm::log1p(-e) + libm::log(*share) + self.log_peak - 0.5 * (dx * dx + dy * dy)
+        };
+        (seen.places.iter().map(near).collect(), off)
+    }
+
+    /// How likely each place is meant, and that none is.
+    fn shares(&self, seen: &Detection, joint: [f64; 2]) -> (SmallVec<[f64; 3]>, f64) {
+        let (mut near, off) = self.parts(seen, Some(joint));
+        let sum = log_sum(&near, off);
+        near.iter_mut().for_each(|n| *n = libm::exp(*n - sum));
+        (near, libm::exp(off - sum))
     }
 
     /// The log density of a detection. `joint` is where the model has the joint; of one that it has nowhere (behind the
     /// camera) every detection is off.
-    pub fn log_density(&self, seen: [f64; 2], confidence: f64, joint: Option<[f64; 2]>) -> f64 {
-        let (near, off) = self.parts(seen, confidence, joint);
-        let (high, low) = if near > off { (near, off) } else { (off, near) };
-        if low == f64::NEG_INFINITY { high } else { high + libm::log1p(libm::exp(low - high)) }
+    pub fn log_density(&self, seen: &Detection, joint: Option<[f64; 2]>) -> f64 {
+        let (near, off) = self.parts(seen, joint);
+        log_sum(&near, off) - (near.len() - 1) as f64 * self.log_area
     }
 
     /// The derivative of the log density by the joint's position.
-    pub fn gradient(&self, seen: [f64; 2], confidence: f64, joint: [f64; 2]) -> [f64; 2] {
-        let (near, off) = self.parts(seen, confidence, Some(joint));
-        if near == f64::NEG_INFINITY {
-            return [0.0; 2];
+    pub fn gradient(&self, seen: &Detection, joint: [f64; 2]) -> [f64; 2] {
+        let (shares, _) = self.shares(seen, joint);
+        let mut sum = [0.0; 2];
+        for ((at, _), share) in seen.places.iter().zip(shares).filter(|(_, share)| *share > 0.0) {
+            for axis in 0..2 {
+                sum[axis] += share * (at[axis] - joint[axis]) / (self.sd * self.sd);
+            }
         }
-        let share = 1.0 / (1.0 + libm::exp(off - near));
-        [0, 1].map(|i| share * (seen[i] - joint[i]) / (self.sd * self.sd))
+        sum
     }
 
     /// Where the joint is, given a detection and where the model has it: the mean, and the variance along an axis (the mean of
     /// the two).
-    pub fn located(&self, seen: [f64; 2], confidence: f64, joint: [f64; 2]) -> ([f64; 2], f64) {
-        let (near, off) = self.parts(seen, confidence, Some(joint));
-        let share = if near == f64::NEG_INFINITY { 0.0 } else { 1.0 / (1.0 + libm::exp(off - near)) };
+    pub fn located(&self, seen: &Detection, joint: [f64; 2]) -> ([f64; 2], f64) {
+        let (shares, off) = self.shares(seen, joint);
         let between = self.offset * self.offset;
         let weight = between / (self.sd * self.sd);
-        let shift = [0, 1].map(|i| weight * (seen[i] - joint[i]));
-        // Of the mixture of a good detection and none: within both, and between them.
-        let within = share * between * (1.0 - weight) + (1.0 - share) * between;
-        let apart = share * (1.0 - share) * 0.5 * (shift[0] * shift[0] + shift[1] * shift[1]);
-        ([0, 1].map(|i| joint[i] + share * shift[i]), within + apart)
+        // Of the mixture of good detections and none: within each, and between them.
+        let (mut shift, mut square, mut within) = ([0.0; 2], 0.0, off * between);
+        for ((at, _), share) in seen.places.iter().zip(shares).filter(|(_, share)| *share > 0.0) {
+            let to = [0, 1].map(|i| weight * (at[i] - joint[i]));
+            (0..2).for_each(|i| shift[i] += share * to[i]);
+            square += share * (to[0] * to[0] + to[1] * to[1]);
+            within += share * between * (1.0 - weight);
+        }
+        let apart = 0.5 * (square - shift[0] * shift[0] - shift[1] * shift[1]);
+        ([0, 1].map(|i| joint[i] + shift[i]), within + apart.max(0.0))
     }
 
-    /// A detection drawn.
-    pub fn sample(&self, confidence: f64, joint: Option<[f64; 2]>, rng: &mut Stream) -> [f64; 2] {
-        match joint {
-            Some([x, y]) if rng.uniform() >= self.outlier(confidence) => {
-                [x + self.sd * rng.standard_normal(), y + self.sd * rng.standard_normal()]
-            }
-            _ => [self.width * rng.uniform(), self.height * rng.uniform()],
+    /// Places drawn, as many as a detection has.
+    pub fn sample(&self, seen: &Detection, joint: Option<[f64; 2]>, rng: &mut Stream) -> SmallVec<[[f64; 2]; 3]> {
+        let mut meant = None;
+        if let Some(at) = joint
+            && rng.uniform() >= self.outlier(seen.confidence)
+        {
+            let mut left = if seen.places.len() > 1 { rng.uniform() } else { 0.0 };
+            let found = seen.places.iter().position(|p| {
+                left -= p.1;
+                left < 0.0
+            });
+            meant = Some((found.unwrap_or(0), at));
         }
+        let one = |i: usize| match meant {
+            Some((m, [x, y])) if m == i => [x + self.sd * rng.standard_normal(), y + self.sd * rng.standard_normal()],
+            _ => [self.width * rng.uniform(), self.height * rng.uniform()],
+        };
+        (0..seen.places.len()).map(one).collect()
     }
+}
+
+/// The log of a sum of these exponentials, of which the last is finite.
+fn log_sum(near: &[f64], off: f64) -> f64 {
+    let most = near.iter().copied().fold(off, f64::max);
+    let rest: f64 = near.iter().chain([&off]).map(|x| libm::exp(x - most)).sum();
+    most + libm::log(rest)
 }
 
 #[cfg(test)]
@@ -138,8 +215,16 @@ mod tests {
     use super::*;
     use crate::rng::{Purpose, StreamKey};
 
+    fn options(sd: f64, outlier: f64) -> KeypointOptions {
+        KeypointOptions { sd, outlier, ..KeypointOptions::default() }
+    }
+
+    fn one(at: [f64; 2], confidence: f64) -> Detection {
+        Detection::new(at, confidence)
+    }
+
     fn model(sd: f64, outlier: f64) -> KeypointLikelihood {
-        KeypointLikelihood::new(400.0, 300.0, &KeypointOptions { sd, outlier, offset: 0.0 }).unwrap()
+        KeypointLikelihood::new(400.0, 300.0, 0.0, &options(sd, outlier)).unwrap()
     }
 
     #[test]
@@ -150,7 +235,7 @@ mod tests {
             for j in 0..600 {
                 for i in 0..800 {
                     let z = [0.5 * (f64::from(i) + 0.5), 0.5 * (f64::from(j) + 0.5)];
-                    sum += 0.25 * libm::exp(m.log_density(z, confidence, Some([180.3, 140.2])));
+                    sum += 0.25 * libm::exp(m.log_density(&one(z, confidence), Some([180.3, 140.2])));
                 }
             }
             assert!((sum - 1.0).abs() < 1e-6, "{sum}");
@@ -161,7 +246,7 @@ mod tests {
     fn values_by_hand_and_limits() {
         let m = model(1.0, 0.05);
         assert_eq!(m.sd(), 5.0, "one percent of 500 pixels");
-        let at = |r: f64| m.log_density([100.0 + r, 100.0], 1.0, Some([100.0, 100.0]));
+        let at = |r: f64| m.log_density(&one([100.0 + r, 100.0], 1.0), Some([100.0, 100.0]));
         let density =
             |r: f64| 0.95 * libm::exp(-r * r / 50.0) / (2.0 * std::f64::consts::PI * 25.0) + 0.05 / (400.0 * 300.0);
         for r in [0.0, 1.0, 7.0, 20.0, 30.0] {
@@ -170,18 +255,18 @@ mod tests {
         let off = libm::log(0.05 / 120_000.0);
         assert_eq!(at(1e200), off);
         for nowhere in [None, Some([f64::NAN, 0.0]), Some([0.0, f64::INFINITY])] {
-            assert!((m.log_density([1.0, 2.0], 1.0, nowhere) - off).abs() < 1e-12);
+            assert!((m.log_density(&one([1.0, 2.0], 1.0), nowhere) - off).abs() < 1e-12);
         }
-        assert!((m.log_density([1.0, 1.0], 0.0, Some([1.0, 1.0])) + libm::log(120_000.0)).abs() < 1e-12);
+        assert!((m.log_density(&one([1.0, 1.0], 0.0), Some([1.0, 1.0])) + libm::log(120_000.0)).abs() < 1e-12);
         assert_eq!(m.outlier(1.0), 0.050000000000000044, "{}", m.outlier(1.0));
-        assert!(model(1e-300, 1e-300).log_density([1.0, 1.0], 1.0, Some([2.0, 1.0])).is_finite());
+        assert!(model(1e-300, 1e-300).log_density(&one([1.0, 1.0], 1.0), Some([2.0, 1.0])).is_finite());
     }
 
     #[test]
     fn sizes_are_positive_and_less_than_a_thousand_million() {
-        let options = KeypointOptions { sd: 1.0, outlier: 0.05, offset: 0.0 };
+        let options = options(1.0, 0.05);
         for (width, fits) in [(1e9, false), (999_999_999.0, true), (1e-9, true), (0.0, false), (f64::NAN, false)] {
-            assert_eq!(KeypointLikelihood::new(width, 300.0, &options).is_ok(), fits, "{width}");
+            assert_eq!(KeypointLikelihood::new(width, 300.0, 0.0, &options).is_ok(), fits, "{width}");
         }
     }
 
@@ -191,12 +276,12 @@ mod tests {
         for joint in [[200.0, 150.0], [203.0, 148.5], [210.0, 170.0], [225.0, 150.0], [260.0, 150.0]] {
             for confidence in [1.0, 0.5, 0.01, 0.0] {
                 let z = [200.0, 150.0];
-                let g = m.gradient(z, confidence, joint);
+                let g = m.gradient(&one(z, confidence), joint);
                 for axis in 0..2 {
                     let shifted = |h: f64| {
                         let mut p = joint;
                         p[axis] += h;
-                        m.log_density(z, confidence, Some(p))
+                        m.log_density(&one(z, confidence), Some(p))
                     };
                     let slope = (shifted(1e-4) - shifted(-1e-4)) / 2e-4;
                     assert!((g[axis] - slope).abs() < 1e-6, "{joint:?} {confidence} {g:?} {slope}");
@@ -207,12 +292,12 @@ mod tests {
 
     #[test]
     fn a_joint_lies_between_the_model_and_the_detection() {
-        let options = KeypointOptions { sd: 0.6, outlier: 0.1, offset: 0.8 };
-        let m = KeypointLikelihood::new(400.0, 300.0, &options).unwrap();
+        let options = KeypointOptions { offset: 0.8, ..options(0.6, 0.1) };
+        let m = KeypointLikelihood::new(400.0, 300.0, 0.0, &options).unwrap();
         assert!((m.sd() - 5.0).abs() < 1e-12, "both spreads: 3 and 4 pixels");
         let (seen, joint) = ([103.0, 96.0], [100.0, 100.0]);
         // By quadrature over where the joint is: N(q; joint, 4) times the density of the detection about q.
-        let own = KeypointLikelihood::new(400.0, 300.0, &KeypointOptions { offset: 0.0, ..options.clone() }).unwrap();
+        let own = KeypointLikelihood::new(400.0, 300.0, 0.0, &KeypointOptions { offset: 0.0, ..options.clone() }).unwrap();
         for confidence in [1.0, 0.3, 0.0] {
             let (mut mass, mut mean, mut square) = (0.0, [0.0; 2], 0.0);
             for i in -80..=80 {
@@ -220,7 +305,7 @@ mod tests {
                     let d = [f64::from(i) * 0.25, f64::from(j) * 0.25];
                     let q = [joint[0] + d[0], joint[1] + d[1]];
                     let prior = libm::exp(-(d[0] * d[0] + d[1] * d[1]) / 32.0);
-                    let w = prior * libm::exp(own.log_density(seen, confidence, Some(q)));
+                    let w = prior * libm::exp(own.log_density(&one(seen, confidence), Some(q)));
                     mass += w;
                     (mean[0], mean[1]) = (mean[0] + w * q[0], mean[1] + w * q[1]);
                     square += w * (d[0] * d[0] + d[1] * d[1]);
@@ -229,12 +314,12 @@ mod tests {
             let mean = mean.map(|x| x / mass);
             let shift = [mean[0] - joint[0], mean[1] - joint[1]];
             let variance = 0.5 * (square / mass - shift[0] * shift[0] - shift[1] * shift[1]);
-            let (at, found) = m.located(seen, confidence, joint);
+            let (at, found) = m.located(&one(seen, confidence), joint);
             assert!((at[0] - mean[0]).abs() < 1e-3 && (at[1] - mean[1]).abs() < 1e-3, "{at:?} {mean:?}");
             assert!((found - variance).abs() < 1e-2, "{found} {variance}");
         }
         let exact = model(1.0, 0.05);
-        assert_eq!(exact.located(seen, 1.0, joint), (joint, 0.0), "without an offset the model's joint is the joint");
+        assert_eq!(exact.located(&one(seen, 1.0), joint), (joint, 0.0), "without an offset the model's joint is the joint");
     }
 
     #[test]
@@ -244,7 +329,7 @@ mod tests {
         let n = 40_000;
         let (mut near, mut square) = (0.0, 0.0);
         for _ in 0..n {
-            let z = m.sample(0.5, Some([200.0, 150.0]), &mut rng);
+            let z = m.sample(&one([0.0; 2], 0.5), Some([200.0, 150.0]), &mut rng)[0];
             let r2 = (z[0] - 200.0) * (z[0] - 200.0) + (z[1] - 150.0) * (z[1] - 150.0);
             if r2 < 400.0 {
                 near += 1.0;
@@ -256,13 +341,13 @@ mod tests {
         assert!((near / f64::from(n) - expected).abs() < 0.01, "{}", near / f64::from(n));
         assert!((square / near - 50.0).abs() < 4.0, "{}", square / near);
         let m = model(1.0, 0.2);
-        assert!((0..100).all(|_| m.sample(1.0, None, &mut rng)[1] < 300.0));
+        assert!((0..100).all(|_| m.sample(&one([0.0; 2], 1.0), None, &mut rng)[0][1] < 300.0));
     }
 
     #[test]
     fn options_are_checked() {
         let of = |w: f64, sd: f64, outlier: f64| {
-            KeypointLikelihood::new(w, 10.0, &KeypointOptions { sd, outlier, offset: 0.0 })
+            KeypointLikelihood::new(w, 10.0, 0.0, &options(sd, outlier))
         };
         assert!(of(10.0, 1.0, 0.1).is_ok());
         for (w, sd, outlier) in [

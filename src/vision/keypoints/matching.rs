@@ -39,10 +39,9 @@ pub fn matching(
 mod tests {
     use super::*;
     use crate::vision::keypoints::Keypoint;
-    use std::sync::Arc;
 
     fn of(names: &[&str]) -> Keypoints {
-        let point = |n: &&str| Keypoint { name: Arc::from(*n), x: 1.0, y: 2.0, confidence: 1.0 };
+        let point = |n: &&str| Keypoint::new(*n, [1.0, 2.0], 1.0);
         Keypoints::new(names.iter().map(point).collect()).unwrap()
     }
 

@@ -28,7 +28,7 @@ mod people;
 mod calibration_tests;
 
 pub use error::KeypointsError;
-pub use likelihood::{KeypointLikelihood, KeypointOptions};
+pub use likelihood::{Detection, KeypointLikelihood, KeypointOptions, Unit};
 pub use matching::matching;
 pub use names::{COCO, MEDIAPIPE};
 pub use people::{People, split_id};
@@ -46,6 +46,26 @@ pub struct Keypoint {
     pub y: f64,
     /// The detector's confidence, 0 to 1; 1 if it gives none.
     pub confidence: f64,
+    /// Where else it may be, if the detector is of several minds.
+    pub others: Vec<Elsewhere>,
+}
+
+/// Another place where a joint may be.
+#[derive(Clone, Copy, Debug, PartialEq)]
+pub struct Elsewhere {
+    /// As [`Keypoint::x`].
+    pub x: f64,
+    /// As [`Keypoint::y`].
+    pub y: f64,
+    /// How likely in proportion to the joint's own place: positive.
+    pub weight: f64,
+}
+
+impl Keypoint {
+    /// At one place.
+    pub fn new(name: impl Into<Arc<str>>, [x, y]: [f64; 2], confidence: f64) -> Keypoint {
+        Keypoint { name: name.into(), x, y, confidence, others: Vec::new() }
+    }
 }
 
 /// The joints detected of one person; none if nobody was.
@@ -54,7 +74,14 @@ pub struct Keypoints {
     points: Vec<Keypoint>,
     normalised: bool,
     size: Option<(u32, u32)>,
+    /// The length of the torso in pixels, if it is not to be taken from the points.
+    torso: Option<f64>,
 }
+
+/// The ways across a torso.
+const ACROSS: [[&str; 2]; 2] = [["l_shoulder", "r_hip"], ["r_shoulder", "l_hip"]];
+/// A torso is at least this share of the longer side of the box round all joints: seen from its end it is no measure.
+const LEAST_TORSO: f64 = 0.2;
 
 impl Keypoints {
     /// A set in pixels.
@@ -68,6 +95,10 @@ impl Keypoints {
             }
             if !(p.x.is_finite() && p.y.is_finite()) {
                 return Err(KeypointsError::new(format!("the position of the keypoint `{}` is not finite", p.name)));
+            }
+            let sound = |o: &Elsewhere| o.x.is_finite() && o.y.is_finite() && o.weight > 0.0 && o.weight.is_finite();
+            if !p.others.iter().all(sound) {
+                return Err(KeypointsError::new(format!("another place of the keypoint `{}` is not finite", p.name)));
             }
             if !(0.0..=1.0).contains(&p.confidence) {
                 let (name, c) = (&p.name, p.confidence);
@@ -105,7 +136,8 @@ impl Keypoints {
     /// The same joints at other places, in the same units: as many of `points` as there are joints.
     #[must_use]
     pub fn moved(&self, points: &[Keypoint]) -> Keypoints {
-        let moved = |(p, to): (&Keypoint, &Keypoint)| Keypoint { x: to.x, y: to.y, ..p.clone() };
+        let moved =
+            |(p, to): (&Keypoint, &Keypoint)| Keypoint { x: to.x, y: to.y, others: to.others.clone(), ..p.clone() };
         Keypoints { points: self.points.iter().zip(points).map(moved).collect(), ..self.clone() }
     }
 
@@ -116,11 +148,51 @@ impl Keypoints {
         Keypoints { size: self.size.or(known), ..self }
     }
 
+    /// The same with a torso of this length in pixels, wherever the joints are.
+    #[must_use]
+    pub fn with_torso(self, torso: f64) -> Keypoints {
+        Keypoints { torso: Some(torso), ..self }
+    }
+
+    /// The length of the torso in pixels of an image of this size: the mean of the ways from a shoulder to the opposite hip, as far as
+    /// they were detected, and at least a fifth of the box round all joints. 0 without joints.
+    pub fn torso(&self, size: (u32, u32)) -> f64 {
+        if let Some(torso) = self.torso {
+            return torso;
+        }
+        let find = |name: &str| self.points.iter().find(|p| &*p.name == name).map(|p| self.position(p, size));
+        let across = |[a, b]: [&str; 2]| {
+            let (a, b) = (find(a)?, find(b)?);
+            Some(libm::hypot(a[0] - b[0], a[1] - b[1]))
+        };
+        let known: Vec<f64> = ACROSS.into_iter().filter_map(across).collect();
+        let long = known.iter().sum::<f64>() / known.len().max(1) as f64;
+        let places = || self.points.iter().map(|p| self.position(p, size));
+        let extent = |axis: usize| {
+            let along = || places().map(move |p| p[axis]);
+            along().fold(f64::NEG_INFINITY, f64::max) - along().fold(f64::INFINITY, f64::min)
+        };
+        long.max(LEAST_TORSO * extent(0).max(extent(1)))
+    }
+
+    /// A joint as detected, in pixels of an image of this size.
+    pub fn detection(&self, of: &Keypoint, size: (u32, u32)) -> Detection {
+        let one = Detection::new(self.position(of, size), of.confidence);
+        match of.others.is_empty() {
+            true => one,
+            false => one.or(of.others.iter().map(|o| (self.scaled([o.x, o.y], size), o.weight))),
+        }
+    }
+
     /// The position of a joint in pixels of an image of this size, where the set itself is in pixels of it or normalised.
     pub fn position(&self, of: &Keypoint, (width, height): (u32, u32)) -> [f64; 2] {
+        self.scaled([of.x, of.y], (width, height))
+    }
+
+    fn scaled(&self, [x, y]: [f64; 2], (width, height): (u32, u32)) -> [f64; 2] {
         match self.normalised {
-            true => [of.x * f64::from(width), of.y * f64::from(height)],
-            false => [of.x, of.y],
+            true => [x * f64::from(width), y * f64::from(height)],
+            false => [x, y],
         }
     }
 }

@@ -8,16 +8,18 @@ mod consensus;
 mod detection;
 pub mod json;
 mod landmarks;
+pub mod networks;
 #[cfg(test)]
 mod tests;
 mod window;
 
 use crate::nn::{Network, NetworkError, sigmoid};
-use crate::platform::threads::in_parallel;
+use crate::platform::threads::side_by_side;
 use crate::vision::Photo;
 use crate::vision::keypoints::MEDIAPIPE;
 use consensus::{Run, by_person, consensus, prominence};
 use landmarks::{NAMED, SIDE, View};
+use std::thread::available_parallelism;
 use window::Window;
 
 /// The longest side that is looked at; larger pictures are made smaller first.
@@ -104,7 +106,8 @@ impl PeopleFinder {
         Ok(finder)
     }
 
-    /// The people in a photograph, the most prominent first; `threads` views are looked at side by side.
+    /// The people in a photograph, the most prominent first; `threads` views (0: as many as there are cores) are looked at side by
+    /// side.
     ///
     /// # Errors
     /// Those of the networks, which sound ones do not have.
@@ -117,8 +120,13 @@ impl PeopleFinder {
         let paddings = [0.0, 0.3, 0.15, 0.5].into_iter().take(options.views.div_ceil(2).clamp(1, 4) as usize);
         let whole = |padding| Window::whole(width, height, padding);
         let views: Vec<Window> = paddings.flat_map(|p| [whole(p), Window { mirrored: true, ..whole(p) }]).collect();
-        let runs = in_parallel(threads, views, |view| self.runs(looked_at, &view, options));
-        let mut runs: Vec<Run> = runs.into_iter().collect::<Result<Vec<_>, _>>()?.concat();
+        let mut seen: Vec<_> = views.into_iter().map(|view| (view, Ok(Vec::new()))).collect();
+        let threads = if threads == 0 { available_parallelism().map_or(1, usize::from) } else { threads };
+        let share = seen.len().div_ceil(threads).max(1);
+        side_by_side(seen.chunks_mut(share), |_, part| {
+            part.iter_mut().for_each(|(view, runs)| *runs = self.runs(looked_at, view, options));
+        });
+        let mut runs: Vec<Run> = seen.into_iter().map(|(_, runs)| runs).collect::<Result<Vec<_>, _>>()?.concat();
         if runs.iter().any(|r| r.view.presence > PRESENT) {
             runs.retain(|r| r.view.presence > PRESENT);
         }

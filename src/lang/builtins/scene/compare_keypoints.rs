@@ -10,13 +10,13 @@ use super::{ViewValue, native};
 use crate::diag::nearest;
 use crate::geom::Landmark;
 use crate::lang::adjoint::Adjoint;
-use crate::lang::builtins::{Row, Type, opt};
+use crate::lang::builtins::{Args, Row, Type, opt};
+use crate::lang::error::Fault;
 use crate::lang::value::{Likelihood, Located, Value};
 use crate::render::{Camera, View};
 use crate::rng::Stream;
-use crate::vision::keypoints::{KeypointLikelihood, KeypointOptions, matching};
+use crate::vision::keypoints::{Detection, KeypointLikelihood, KeypointOptions, Unit, matching};
 use glam::DVec3;
-use smallvec::smallvec;
 use std::sync::Arc;
 
 pub(super) const TABLE: &[Row] = &[native(
@@ -24,31 +24,68 @@ pub(super) const TABLE: &[Row] = &[native(
     SECTION,
     &[
         SEEN,
-        opt("sd", Type::Num, "1.5", "The spread of a good detection along each axis.").unit("percent of the diagonal"),
+        opt(
+            "sd",
+            Type::Any,
+            "1.5",
+            "The spread of a good detection along each axis: a number, or a record of numbers by joint with `other` for the rest.",
+        )
+        .unit("percent of the diagonal"),
         opt("outlier", Type::Num, "0.05", "The share of detections of full confidence that are off."),
         opt("offset", Type::Num, "0", "The spread of a joint about where the scene has it, along each axis: bodies differ.")
             .unit("percent of the diagonal"),
+        opt(
+            "unit",
+            Type::Str,
+            "\"diagonal\"",
+            "What `sd` and `offset` are given in: \"diagonal\", percent of the picture's; \"torso\", lengths of the detected torso.",
+        ),
+        opt("confidence", Type::Bool, "true", "Whether a detection that is not sure is the more often off."),
     ],
     Type::Likelihood,
     "The density of detected joints: each near its landmark or anywhere in the picture; what was not found says nothing.",
     |a| {
-        let (sd, outlier, offset) = (a.positive_or(1, 1.5)?, a.num_or(2, 0.05)?, a.num_or(3, 0.0)?);
-        let options = KeypointOptions { sd, outlier, offset };
+        let (outlier, offset) = (a.num_or(2, 0.05)?, a.num_or(3, 0.0)?);
+        let unit = match a.choice(4, &["diagonal", "torso"])? {
+            "torso" => Unit::Torso,
+            _ => Unit::Diagonal,
+        };
+        let (sd, by_joint) = spreads(a)?;
+        let options = KeypointOptions { sd, outlier, offset, unit };
         if !(options.outlier > 0.0 && options.outlier < 1.0) {
             return Err(a.outside(2, "strictly between 0 and 1"));
         }
         if !(options.offset >= 0.0 && options.offset.is_finite()) {
             return Err(a.outside(3, "not negative and finite"));
         }
-        likelihood(KeypointsOf { view: view(a)?, options })
+        likelihood(KeypointsOf { view: view(a)?, options, by_joint, confident: a.bool_or(5, true)? })
     },
 )
-.pull(|_, _, by| Some(smallvec![by.clone(), Adjoint::Unknown, Adjoint::Unknown, Adjoint::Unknown]))];
+.pull(|_, _, by| Some(std::iter::once(by.clone()).chain((0..5).map(|_| Adjoint::Unknown)).collect()))];
 
 #[derive(Debug)]
 struct KeypointsOf {
     view: Arc<View>,
     options: KeypointOptions,
+    /// Joints with a spread of their own.
+    by_joint: Vec<(Arc<str>, f64)>,
+    /// Whether confidences count.
+    confident: bool,
+}
+
+/// The spread of joints, and those with one of their own.
+fn spreads(a: &Args) -> Result<(f64, Vec<(Arc<str>, f64)>), Fault> {
+    let Value::Record(record) = a.get(1) else { return Ok((a.positive_or(1, 1.5)?, Vec::new())) };
+    let positive = |v: &Value| match v {
+        Value::Num(x) if *x > 0.0 && x.is_finite() => Ok(*x),
+        v => Err(a.element_wrong(1, "a positive number, or a record of them with `other`", v)),
+    };
+    let Some(other) = record.get("other") else {
+        return Err(Fault::type_error("scene.keypoints: the record `sd` needs a field `other` for the rest of the joints"));
+    };
+    let named = record.iter().filter(|(name, _)| &***name != "other");
+    let named = named.map(|(name, v)| Ok((Arc::clone(name), positive(v)?))).collect::<Result<_, Fault>>()?;
+    Ok((positive(other)?, named))
 }
 
 /// Where a landmark is in a picture of some size; none behind the camera.
@@ -73,7 +110,7 @@ impl Likelihood for KeypointsOf {
 
     fn log_density(&self, observed: &Value) -> Result<f64, String> {
         let mut sum = 0.0;
-        self.each(observed, |term| sum += term.model.log_density(term.seen, term.confidence, term.joint))?;
+        self.each(observed, |term| sum += term.model.log_density(&term.seen, term.joint))?;
         Ok(sum)
     }
 
@@ -81,14 +118,21 @@ impl Likelihood for KeypointsOf {
     fn sample(&self, observed: &Value, rng: &mut Stream) -> Option<Result<Value, String>> {
         let KeypointsValue(seen) = observed.downcast::<KeypointsValue>()?;
         let mut points = seen.points().to_vec();
+        let mut torso = 0.0;
         let drawn = self.each(observed, |t| {
-            let at = t.model.sample(t.confidence, t.joint, rng);
+            let at = t.model.sample(&t.seen, t.joint, rng);
             let [w, h] = if seen.is_normalised() { [t.size.0, t.size.1] } else { [1.0; 2] };
-            if let Some(p) = points.get_mut(t.point) {
-                (p.x, p.y) = (at[0] / w, at[1] / h);
+            torso = t.torso;
+            if let (Some(p), Some((first, rest))) = (points.get_mut(t.point), at.split_first()) {
+                (p.x, p.y) = (first[0] / w, first[1] / h);
+                p.others.iter_mut().zip(rest).for_each(|(o, at)| (o.x, o.y) = (at[0] / w, at[1] / h));
             }
         });
-        Some(drawn.map(|()| Value::object(KeypointsValue(seen.moved(&points)))))
+        // In the same unit, wherever the shoulders and hips were drawn.
+        let moved = || seen.moved(&points);
+        Some(drawn.map(|()| {
+            Value::object(KeypointsValue(if torso > 0.0 { moved().with_torso(torso) } else { moved() }))
+        }))
     }
 
     /// The landmarks that were detected, between where the scene has them and where they were seen.
@@ -97,7 +141,7 @@ impl Likelihood for KeypointsOf {
         let landmarks = self.view.solid().landmarks();
         let add = |term: Term| {
             let Some(joint) = term.joint else { return };
-            let (at, variance) = term.model.located(term.seen, term.confidence, joint);
+            let (at, variance) = term.model.located(&term.seen, joint);
             let (width, height) = term.size;
             all.push(Located {
                 name: Arc::clone(&landmarks[term.landmark].name),
@@ -116,7 +160,7 @@ impl Likelihood for KeypointsOf {
         let mut all = vec![DVec3::ZERO; landmarks.len()];
         let add = |term: Term| {
             let Some(joint) = term.joint else { return };
-            let by = term.model.gradient(term.seen, term.confidence, joint);
+            let by = term.model.gradient(&term.seen, joint);
             let by = [by[0] * term.scale[0], by[1] * term.scale[1]];
             all[term.landmark] += camera.pull_point(landmarks[term.landmark].position, by);
         };
@@ -128,8 +172,7 @@ impl Likelihood for KeypointsOf {
 /// One detection and the landmark it is of.
 struct Term<'a> {
     model: &'a KeypointLikelihood,
-    seen: [f64; 2],
-    confidence: f64,
+    seen: Detection,
     landmark: usize,
     /// Which of the detections it is.
     point: usize,
@@ -139,6 +182,8 @@ struct Term<'a> {
     scale: [f64; 2],
     /// The width and height of the picture.
     size: (f64, f64),
+    /// The length of the torso in its pixels.
+    torso: f64,
 }
 
 impl KeypointsOf {
@@ -155,22 +200,31 @@ impl KeypointsOf {
         let names: Vec<&str> = landmarks.iter().map(|l| &*l.name).collect();
         let near = |name: &str, known: &[&str]| nearest(name, known.iter().copied()).map(str::to_owned);
         let found = matching(seen, &names, near).map_err(|e| format!("scene.keypoints: {e}"))?;
-        let model = KeypointLikelihood::new(f64::from(size.0), f64::from(size.1), &self.options)
-            .map_err(|e| format!("scene.keypoints: {e}"))?;
         let whole = (f64::from(size.0), f64::from(size.1));
-        let scale = [f64::from(size.0) / f64::from(camera.width), f64::from(size.1) / f64::from(camera.height)];
+        let torso = seen.torso(size);
+        let model = |sd: f64| {
+            let options = KeypointOptions { sd, ..self.options.clone() };
+            KeypointLikelihood::new(whole.0, whole.1, torso.max(1e-3), &options)
+                .map_err(|e| format!("scene.keypoints: {e}"))
+        };
+        let usual = model(self.options.sd)?;
+        let scale = [whole.0 / f64::from(camera.width), whole.1 / f64::from(camera.height)];
         for (point, (p, at)) in seen.points().iter().zip(found).enumerate() {
             let Some((landmark, l)) = at.and_then(|i| Some((i, landmarks.get(i)?))) else { continue };
-            let joint = project(l, camera, size);
+            let mut detection = seen.detection(p, size);
+            if !self.confident {
+                detection.confidence = 1.0;
+            }
+            let own = self.by_joint.iter().find(|(name, _)| *name == p.name).map(|(_, sd)| model(*sd)).transpose()?;
             f(Term {
-                model: &model,
-                seen: seen.position(p, size),
-                confidence: p.confidence,
+                model: own.as_ref().unwrap_or(&usual),
+                seen: detection,
                 landmark,
                 point,
-                joint,
+                joint: project(l, camera, size),
                 scale,
                 size: whole,
+                torso,
             });
         }
         Ok(())

@@ -11,6 +11,7 @@ mod compare_keypoints;
 mod edges;
 mod objects;
 mod observed;
+mod people;
 mod region;
 mod seeing;
 mod shape_pulls;
@@ -46,7 +47,7 @@ const fn native(
 
 /// All of them.
 pub(super) fn all() -> impl Iterator<Item = &'static Row> {
-    let comparing = [compare::TABLE, compare_keypoints::TABLE, region::TABLE, edges::TABLE];
+    let comparing = [people::TABLE, compare::TABLE, compare_keypoints::TABLE, region::TABLE, edges::TABLE];
     let tables = [shapes::TABLE, bodies::TABLE, seeing::TABLE].into_iter().chain(comparing);
     tables.flatten()
 }

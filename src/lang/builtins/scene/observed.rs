@@ -6,6 +6,7 @@ use crate::vision::{
     Chamfer, ChamferOptions, ContourDetector, ContourMap, ContourRatio, ContourRatioOptions, DepthLikelihood, DepthMap,
     GradientDetector, Keypoints, Mask, MaskLikelihood, Photo, Region, RegionOptions,
 };
+use crate::vision::people::Person;
 use std::any::Any;
 use std::sync::{Arc, Mutex, OnceLock, PoisonError};
 
@@ -37,6 +38,11 @@ impl<K: PartialEq, T> Prepared<K, T> {
         all.push((key, Arc::clone(&made)));
         Ok(made)
     }
+
+    /// The first that was made.
+    pub fn any(&self) -> Option<Arc<T>> {
+        self.0.lock().unwrap_or_else(PoisonError::into_inner).first().map(|(_, t)| Arc::clone(t))
+    }
 }
 
 /// Options and the size of the frame.
@@ -52,6 +58,8 @@ pub struct ImageValue {
     pub(super) regions: Prepared<Key<RegionOptions>, Region>,
     /// The same photograph with contours found otherwise: by what, and how strong they must be.
     detected: Prepared<(GradientDetector, f32), Value>,
+    /// The people in the photograph, by how they were looked for: views, and how many at most.
+    pub(super) people: Prepared<(u32, u32), Vec<(Person, Value)>>,
 }
 
 impl ImageValue {
@@ -72,6 +80,11 @@ impl ImageValue {
     /// The photograph.
     pub fn as_photo(&self) -> Option<&Photo> {
         self.photo.as_ref()
+    }
+
+    /// The people that programs found in it, most prominent first; none if no program has asked.
+    pub fn people(&self) -> Option<Vec<Person>> {
+        self.people.any().map(|all| all.iter().map(|(p, _)| p.clone()).collect())
     }
 
     /// Its contours.
