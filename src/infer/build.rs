@@ -4,7 +4,7 @@ use super::expr::{Scope, evaluate};
 use super::foreign::build_foreign;
 use super::kernel::Kernel;
 use super::kernels::{
-    Abc, AbcSmc, Block, Delayed, Drift, Elliptical, Gibbs, Hmc, Knn, Mh, Nuts, Optimize, Own, Slice, Smc, Temper,
+    Abc, AbcSmc, Block, Delayed, Drift, Elliptical, Gibbs, Hmc, Knn, Mh, Modes, Nuts, Optimize, Own, Slice, Smc, Temper,
 };
 use super::plan::banks::neighbours;
 use super::plan::{RunOptions, argument, call};
@@ -130,13 +130,19 @@ pub(super) fn build(
         "optimize" => {
             Box::new(Optimize::new(scope, whole(argument(args, 1, "steps"), "steps", 100, 1, 1_000_000, env)?))
         }
+        "modes" => {
+            let tries = whole(argument(args, 1, "tries"), "tries", 200, 1, 1_000_000, env)?;
+            let keep = whole(argument(args, 2, "keep"), "keep", 16, 1, 1000, env)?;
+            let steps = whole(argument(args, 3, "steps"), "steps", 60, 1, 1_000_000, env)?;
+            Box::new(Modes::new(scope, tries, keep, steps))
+        }
         _ => return Err(fail(e.span, format!("`{name}` is no kernel"))),
     };
     Ok(Built { kernel, signature })
 }
 
 const AVAILABLE: &str =
-    "mh, block, drift, gibbs, elliptical, hmc, mala, nuts, slice, knn, delayed, temper, smc, abc, optimize";
+    "mh, block, drift, gibbs, elliptical, hmc, mala, nuts, slice, knn, delayed, temper, smc, abc, modes, optimize";
 
 pub(super) fn without(selector: Selector, frozen: &Selector) -> Selector {
     match frozen {

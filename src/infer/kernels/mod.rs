@@ -25,7 +25,7 @@ pub use delayed::Delayed;
 pub use drift::Drift;
 pub use elliptical::Elliptical;
 pub use gibbs::Gibbs;
-pub use hamiltonian::{Hamiltonian, Hmc, Nuts, Optimize};
+pub use hamiltonian::{Hamiltonian, Hmc, Modes, Nuts, Optimize};
 pub use knn::Knn;
 pub use mh::Mh;
 pub(crate) use own::Own;

@@ -177,6 +177,20 @@ pub(super) const TABLE: &[Row] = &[
          observed, in root mean square (Marjoram et al. 2003).",
     ),
     name(
+        "modes",
+        KERNELS,
+        &[
+            SEL,
+            opt("tries", Type::Int, "200", "Draws from the prior among which starts are looked for."),
+            opt("keep", Type::Int, "16", "How many of them, the likeliest, climb to a mode."),
+            opt("steps", Type::Int, "60", "The most steps of a climb."),
+        ],
+        Type::Kernel,
+        "Jumps between modes. Its first step, in warm-up, looks for them: the likeliest of some draws of the selected choices climb by \
+         L-BFGS, and the state becomes one of the modes, drawn by the Laplace estimates of their evidence. From then on all selected \
+         choices are proposed together from the Laplace approximations of all modes (independent Metropolis-Hastings, Tierney 1994).",
+    ),
+    name(
         "optimize",
         KERNELS,
         &[SEL, opt("steps", Type::Int, "100", "The number of gradient steps.")],

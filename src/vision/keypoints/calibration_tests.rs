@@ -97,7 +97,7 @@ fn options(sd: f64, outlier: f64) -> KeypointOptions {
 #[test]
 fn quantiles_of_the_truth_are_uniform() {
     for (outlier, missing, sure) in [(1e-9, 0.0, true), (0.3, 0.0, true), (0.1, 0.4, true), (0.2, 0.3, false)] {
-        let o = options(1.5, outlier);
+        let o = KeypointOptions { misses: missing / 2.0, ..options(1.5, outlier) };
         for minds in [&[][..], &[0.5], &[1.0, 0.25]] {
             let chi = chi_squares(&o, &o, missing, sure, minds);
             assert!(chi.iter().all(|c| *c < CRITICAL), "{outlier} {missing} {minds:?} {chi:?}");

@@ -5,7 +5,8 @@
 //! off with the probability `outlier`, worthless ones tell nothing. `s^2 = sd^2 + offset^2`: the model's joint may be off, too, and
 //! where the joint really is then lies between it and the detection. A detector that is of several minds gives several places
 //! `z_m` with shares `w_m`, of which one is meant and the others are anywhere:
-//! `((1 - e) sum_m w_m N(z_m; p, s^2 I) + e / area) / area^(M - 1)`. Invariant: finite and never NaN, as `e > 0`.
+//! `((1 - e) sum_m w_m N(z_m; p, s^2 I) + e / area) / area^(M - 1)`. A share of good detections may be near misses, with 8 times the
+//! spread: so a body that is far off still feels where its joints were seen. Invariant: finite and never NaN, as `e > 0`.
 
 use crate::rng::Stream;
 use crate::vision::VisionError;
@@ -32,11 +33,16 @@ pub struct KeypointOptions {
     pub offset: f64,
     /// What these are given in.
     pub unit: Unit,
+    /// The share of near misses among good detections; from 0 to less than 1.
+    pub misses: f64,
 }
+
+/// How much wider near misses are spread.
+const MISS: f64 = 8.0;
 
 impl Default for KeypointOptions {
     fn default() -> Self {
-        KeypointOptions { sd: 1.5, outlier: 0.05, offset: 0.0, unit: Unit::Diagonal }
+        KeypointOptions { sd: 1.5, outlier: 0.05, offset: 0.0, unit: Unit::Diagonal, misses: 0.0 }
     }
 }
 
@@ -76,9 +82,13 @@ pub struct KeypointLikelihood {
     /// Of the joint about the model's.
     offset: f64,
     outlier: f64,
+    misses: f64,
     log_peak: f64,
     log_area: f64,
 }
+
+/// By place, near and as a near miss.
+type Logs = SmallVec<[[f64; 2]; 3]>;
 
 impl KeypointLikelihood {
     /// The model for an image of this size and a torso of this length, all in pixels.
@@ -107,8 +117,13 @@ impl KeypointLikelihood {
         if !(outlier > 0.0 && outlier < 1.0) {
             return Err(VisionError::Range { name: "outlier", rule: "strictly between 0 and 1", value: outlier });
         }
+        let misses = options.misses;
+        if !(0.0..1.0).contains(&misses) {
+            return Err(VisionError::Range { name: "misses", rule: "from 0 to less than 1", value: misses });
+        }
         let log_peak = -libm::log(2.0 * std::f64::consts::PI * sd * sd);
-        Ok(KeypointLikelihood { width, height, sd, offset, outlier, log_peak, log_area: libm::log(width * height) })
+        let log_area = libm::log(width * height);
+        Ok(KeypointLikelihood { width, height, sd, offset, outlier, misses, log_peak, log_area })
     }
 
     /// The standard deviation of a good detection about the model's joint along each axis, in pixels.
@@ -124,24 +139,26 @@ impl KeypointLikelihood {
     }
 
     /// The logs of the parts of the density, but for the places that are not meant: of each place, and of none.
-    fn parts(&self, seen: &Detection, joint: Option<[f64; 2]>) -> (SmallVec<[f64; 3]>, f64) {
+    fn parts(&self, seen: &Detection, joint: Option<[f64; 2]>) -> (Logs, f64) {
         let e = self.outlier(seen.confidence);
         let off = libm::log(e) - self.log_area;
         let Some([x, y]) = joint.filter(|j| j.iter().all(|c| c.is_finite())) else {
-            return (seen.places.iter().map(|_| f64::NEG_INFINITY).collect(), off);
+            return (seen.places.iter().map(|_| [f64::NEG_INFINITY; 2]).collect(), off);
         };
+        let logs = [1.0 - self.misses, self.misses / (MISS * MISS)].map(|share| libm::log(share) + self.log_peak);
         let near = |(at, share): &([f64; 2], f64)| {
             let (dx, dy) = ((at[0] - x) / self.sd, (at[1] - y) / self.sd);
-            libm::log1p(-e) + libm::log(*share) + self.log_peak - 0.5 * (dx * dx + dy * dy)
+            let (good, r2) = (libm::log1p(-e) + libm::log(*share), 0.5 * (dx * dx + dy * dy));
+            [good + logs[0] - r2, good + logs[1] - r2 / (MISS * MISS)]
         };
         (seen.places.iter().map(near).collect(), off)
     }
 
-    /// How likely each place is meant, and that none is.
-    fn shares(&self, seen: &Detection, joint: [f64; 2]) -> (SmallVec<[f64; 3]>, f64) {
+    /// How likely each place is meant, well or as a near miss, and that none is.
+    fn shares(&self, seen: &Detection, joint: [f64; 2]) -> (Logs, f64) {
         let (mut near, off) = self.parts(seen, Some(joint));
         let sum = log_sum(&near, off);
-        near.iter_mut().for_each(|n| *n = libm::exp(*n - sum));
+        near.iter_mut().flatten().for_each(|n| *n = libm::exp(*n - sum));
         (near, libm::exp(off - sum))
     }
 
@@ -156,9 +173,10 @@ impl KeypointLikelihood {
     pub fn gradient(&self, seen: &Detection, joint: [f64; 2]) -> [f64; 2] {
         let (shares, _) = self.shares(seen, joint);
         let mut sum = [0.0; 2];
-        for ((at, _), share) in seen.places.iter().zip(shares).filter(|(_, share)| *share > 0.0) {
-            for axis in 0..2 {
-                sum[axis] += share * (at[axis] - joint[axis]) / (self.sd * self.sd);
+        for ((at, _), [well, miss]) in seen.places.iter().zip(shares) {
+            let pull = well + miss / (MISS * MISS);
+            if pull > 0.0 {
+                (0..2).for_each(|i| sum[i] += pull * (at[i] - joint[i]) / (self.sd * self.sd));
             }
         }
         sum
@@ -169,14 +187,16 @@ impl KeypointLikelihood {
     pub fn located(&self, seen: &Detection, joint: [f64; 2]) -> ([f64; 2], f64) {
         let (shares, off) = self.shares(seen, joint);
         let between = self.offset * self.offset;
-        let weight = between / (self.sd * self.sd);
-        // Of the mixture of good detections and none: within each, and between them.
+        // Of the mixture of good detections, near misses and none: within each, and between them.
         let (mut shift, mut square, mut within) = ([0.0; 2], 0.0, off * between);
-        for ((at, _), share) in seen.places.iter().zip(shares).filter(|(_, share)| *share > 0.0) {
-            let to = [0, 1].map(|i| weight * (at[i] - joint[i]));
-            (0..2).for_each(|i| shift[i] += share * to[i]);
-            square += share * (to[0] * to[0] + to[1] * to[1]);
-            within += share * between * (1.0 - weight);
+        for ((at, _), both) in seen.places.iter().zip(shares) {
+            for (share, wider) in both.into_iter().zip([1.0, MISS]).filter(|(share, _)| *share > 0.0) {
+                let weight = between / (wider * wider * self.sd * self.sd);
+                let to = [0, 1].map(|i| weight * (at[i] - joint[i]));
+                (0..2).for_each(|i| shift[i] += share * to[i]);
+                square += share * (to[0] * to[0] + to[1] * to[1]);
+                within += share * between * (1.0 - weight);
+            }
         }
         let apart = 0.5 * (square - shift[0] * shift[0] - shift[1] * shift[1]);
         ([0, 1].map(|i| joint[i] + shift[i]), within + apart.max(0.0))
@@ -195,8 +215,10 @@ impl KeypointLikelihood {
             });
             meant = Some((found.unwrap_or(0), at));
         }
+        let missed = meant.is_some() && self.misses > 0.0 && rng.uniform() < self.misses;
+        let sd = if missed { MISS * self.sd } else { self.sd };
         let one = |i: usize| match meant {
-            Some((m, [x, y])) if m == i => [x + self.sd * rng.standard_normal(), y + self.sd * rng.standard_normal()],
+            Some((m, [x, y])) if m == i => [x + sd * rng.standard_normal(), y + sd * rng.standard_normal()],
             _ => [self.width * rng.uniform(), self.height * rng.uniform()],
         };
         (0..seen.places.len()).map(one).collect()
@@ -204,9 +226,9 @@ impl KeypointLikelihood {
 }
 
 /// The log of a sum of these exponentials, of which the last is finite.
-fn log_sum(near: &[f64], off: f64) -> f64 {
-    let most = near.iter().copied().fold(off, f64::max);
-    let rest: f64 = near.iter().chain([&off]).map(|x| libm::exp(x - most)).sum();
+fn log_sum(near: &[[f64; 2]], off: f64) -> f64 {
+    let most = near.iter().flatten().copied().fold(off, f64::max);
+    let rest: f64 = near.iter().flatten().chain([&off]).map(|x| libm::exp(x - most)).sum();
     most + libm::log(rest)
 }
 
@@ -229,8 +251,11 @@ mod tests {
 
     #[test]
     fn the_density_integrates_to_one() {
-        for (sd, outlier, confidence) in [(1.5, 0.05, 1.0), (1.0, 0.3, 0.4), (2.0, 0.05, 0.0)] {
-            let m = model(sd, outlier);
+        for (sd, outlier, confidence, misses) in
+            [(1.5, 0.05, 1.0, 0.0), (1.0, 0.3, 0.4, 0.0), (2.0, 0.05, 0.0, 0.0), (0.5, 0.1, 0.8, 0.3)]
+        {
+            let o = KeypointOptions { misses, ..options(sd, outlier) };
+            let m = KeypointLikelihood::new(400.0, 300.0, 0.0, &o).unwrap();
             let mut sum = 0.0;
             for j in 0..600 {
                 for i in 0..800 {

@@ -8,7 +8,9 @@
 mod adapt;
 mod hmc;
 mod kernel;
+mod laplace;
 mod memory;
+mod modes;
 mod nuts;
 mod optimize;
 mod summed;
@@ -16,6 +18,7 @@ mod system;
 
 pub use hmc::Hmc;
 pub use kernel::Hamiltonian;
+pub use modes::Modes;
 pub use nuts::Nuts;
 pub use optimize::Optimize;
 

@@ -76,6 +76,42 @@ fn climb(system: &mut System, from: &Point, along: &[f64]) -> TraceResult<Option
     Ok(None)
 }
 
+/// The place that so many steps up from another lead to.
+pub(super) fn ascend(system: &mut System, begun: &Arc<Point>, steps: u32) -> TraceResult<Arc<Point>> {
+    let mut here = Arc::clone(begun);
+    let mut past: VecDeque<Pair> = VecDeque::new();
+    for _ in 0..steps {
+        let mut along = direction(&here.gradient, &past);
+        let slope = dot(&along, &here.gradient);
+        if slope.is_nan() || slope <= 0.0 {
+            past.clear();
+            along = direction(&here.gradient, &past);
+        }
+        let Some(next) = climb(system, &here, &along)? else {
+            if past.is_empty() {
+                break;
+            }
+            past.clear();
+            continue;
+        };
+        let step: Vec<f64> = next.y.iter().zip(&here.y).map(|(a, b)| a - b).collect();
+        let change: Vec<f64> = here.gradient.iter().zip(&next.gradient).map(|(a, b)| a - b).collect();
+        let gain = next.log_density - here.log_density;
+        if dot(&step, &change) > 1e-12 * dot(&change, &change) {
+            past.push_back(Pair { step, change });
+            if past.len() > MEMORY {
+                past.pop_front();
+            }
+        }
+        here = next;
+        let flat = here.gradient.iter().all(|g| g.abs() < 1e-7);
+        if flat || gain.abs() <= 1e-13 * (1.0 + here.log_density.abs()) {
+            break;
+        }
+    }
+    Ok(here)
+}
+
 impl Kernel for Optimize {
     fn name(&self) -> String {
         "optimize".into()
@@ -96,37 +132,7 @@ impl Kernel for Optimize {
         let Some((mut system, begun)) = System::begin(trace, at, &targets, None, &mut self.memory)? else {
             return Ok(Outcome::default());
         };
-        let mut here = Arc::clone(&begun);
-        let mut past: VecDeque<Pair> = VecDeque::new();
-        for _ in 0..self.steps {
-            let mut along = direction(&here.gradient, &past);
-            let slope = dot(&along, &here.gradient);
-            if slope.is_nan() || slope <= 0.0 {
-                past.clear();
-                along = direction(&here.gradient, &past);
-            }
-            let Some(next) = climb(&mut system, &here, &along)? else {
-                if past.is_empty() {
-                    break;
-                }
-                past.clear();
-                continue;
-            };
-            let step: Vec<f64> = next.y.iter().zip(&here.y).map(|(a, b)| a - b).collect();
-            let change: Vec<f64> = here.gradient.iter().zip(&next.gradient).map(|(a, b)| a - b).collect();
-            let gain = next.log_density - here.log_density;
-            if dot(&step, &change) > 1e-12 * dot(&change, &change) {
-                past.push_back(Pair { step, change });
-                if past.len() > MEMORY {
-                    past.pop_front();
-                }
-            }
-            here = next;
-            let flat = here.gradient.iter().all(|g| g.abs() < 1e-7);
-            if flat || gain.abs() <= 1e-13 * (1.0 + here.log_density.abs()) {
-                break;
-            }
-        }
+        let here = ascend(&mut system, &begun, self.steps)?;
         let moved = here.log_density > begun.log_density && system.settle(Some(&here))?;
         if !moved {
             trace.rollback();

@@ -41,27 +41,31 @@ pub(super) const TABLE: &[Row] = &[native(
             "What `sd` and `offset` are given in: \"diagonal\", percent of the picture's; \"torso\", lengths of the detected torso.",
         ),
         opt("confidence", Type::Bool, "true", "Whether a detection that is not sure is the more often off."),
+        opt("misses", Type::Num, "0", "The share of near misses among the others: they have 8 times the spread."),
     ],
     Type::Likelihood,
     "The density of detected joints: each near its landmark or anywhere in the picture; what was not found says nothing.",
     |a| {
-        let (outlier, offset) = (a.num_or(2, 0.05)?, a.num_or(3, 0.0)?);
+        let (outlier, offset, misses) = (a.num_or(2, 0.05)?, a.num_or(3, 0.0)?, a.num_or(6, 0.0)?);
         let unit = match a.choice(4, &["diagonal", "torso"])? {
             "torso" => Unit::Torso,
             _ => Unit::Diagonal,
         };
         let (sd, by_joint) = spreads(a)?;
-        let options = KeypointOptions { sd, outlier, offset, unit };
+        let options = KeypointOptions { sd, outlier, offset, unit, misses };
         if !(options.outlier > 0.0 && options.outlier < 1.0) {
             return Err(a.outside(2, "strictly between 0 and 1"));
         }
         if !(options.offset >= 0.0 && options.offset.is_finite()) {
             return Err(a.outside(3, "not negative and finite"));
         }
+        if !(0.0..1.0).contains(&options.misses) {
+            return Err(a.outside(6, "from 0 to less than 1"));
+        }
         likelihood(KeypointsOf { view: view(a)?, options, by_joint, confident: a.bool_or(5, true)? })
     },
 )
-.pull(|_, _, by| Some(std::iter::once(by.clone()).chain((0..5).map(|_| Adjoint::Unknown)).collect()))];
+.pull(|_, _, by| Some(std::iter::once(by.clone()).chain((0..6).map(|_| Adjoint::Unknown)).collect()))];
 
 #[derive(Debug)]
 struct KeypointsOf {

@@ -12,6 +12,8 @@ use std::sync::Arc;
 
 /// The longer side of the masks of people, in pixels.
 const MASK: u32 = 256;
+/// How likely a pose is that some views have in proportion to the one that most agree on, for each view.
+const ELSEWHERE: f64 = 0.05;
 
 pub(super) const TABLE: &[Row] = &[native(
     "people",
@@ -69,7 +71,7 @@ fn value(p: &Person, photo: &Photo) -> Result<Value, String> {
     let point = |(i, (name, l)): (usize, (&&'static str, &crate::vision::people::Landmark))| {
         let elsewhere = p.others.iter().map(|h| {
             let [x, y] = h.landmarks[i].at;
-            Elsewhere { x, y, weight: h.views as f64 / p.agreeing.max(1) as f64 }
+            Elsewhere { x, y, weight: ELSEWHERE * h.views as f64 / p.agreeing.max(1) as f64 }
         });
         let one = Keypoint::new(*name, l.at, l.visibility.clamp(0.0, 1.0));
         Keypoint { others: elsewhere.collect(), ..one }

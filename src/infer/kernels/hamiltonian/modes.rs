@@ -1,0 +1,272 @@
+//! `modes(sel)`: independent Metropolis-Hastings from the Laplace approximations of modes that were found before.
+//!
+//! The first step in warm-up looks for modes. From then on the mixture of their approximations is fixed, so that proposing from it is
+//! exact whatever it misses: what it misses is only visited by other kernels. Weighing modes by their evidence makes a chain
+//! begin where the mass is, and not where it happened to climb.
+
+use super::laplace::Laplace;
+use super::optimize::ascend;
+use super::{Memory, System};
+use crate::dist::Datum;
+use crate::infer::kernel::{At, Kernel, Outcome, Registered, Scope, recoverable, settle};
+use crate::infer::state::{StateError, pack, unpack};
+use crate::rng::Stream;
+use crate::trace::{Change, Constraint, Target, Trace, TraceResult};
+use serde::{Deserialize, Serialize};
+
+/// The step of the differences that curvatures are taken from.
+const STEP: f64 = 1e-4;
+/// Modes that are this much less likely than the best, in nats, are left out; and at most so many are kept.
+const BEHIND: f64 = 30.0;
+const MOST: usize = 12;
+/// The share of proposals that go to all modes alike: evidence is an estimate.
+const ALIKE: f64 = 0.1;
+
+/// A mode: values of the discrete choices, a Gaussian for the others, the log of its share.
+#[derive(Clone, Debug, Serialize, Deserialize)]
+struct Mode {
+    discrete: Vec<Datum>,
+    about: Laplace,
+    log_share: f64,
+}
+
+/// What was found, and for which choices.
+#[derive(Clone, Debug, Default, Serialize, Deserialize)]
+struct Found {
+    /// By choice: its address, and how many free coordinates it has; none of those that are discrete.
+    signature: Vec<(u64, usize)>,
+    modes: Vec<Mode>,
+}
+
+/// Jumps between modes.
+#[derive(Clone, Debug)]
+pub struct Modes {
+    scope: Registered,
+    tries: u32,
+    keep: u32,
+    steps: u32,
+    found: Option<Found>,
+}
+
+/// The selected choices of a state: which are discrete, and where the others are.
+struct Here {
+    signature: Vec<(u64, usize)>,
+    targets: Vec<Target>,
+    discrete: Vec<Datum>,
+    y: Vec<f64>,
+    log_jacobian: f64,
+}
+
+impl Here {
+    fn of(trace: &Trace, targets: &[Target]) -> Option<Here> {
+        let mut here = Here {
+            signature: Vec::with_capacity(targets.len()),
+            targets: targets.to_vec(),
+            discrete: Vec::new(),
+            y: Vec::new(),
+            log_jacobian: 0.0,
+        };
+        for t in targets {
+            let free = trace.free_to_move(*t).filter(|(own, _)| !own.is_empty());
+            here.signature.push((trace.address_hash(*t), free.as_ref().map_or(0, |(own, _)| own.len())));
+            match free {
+                Some((own, log_jacobian)) => {
+                    here.y.extend(own);
+                    here.log_jacobian += log_jacobian;
+                }
+                None => here.discrete.push(trace.stored(*t)?),
+            }
+        }
+        Some(here)
+    }
+
+    /// What leads to another place of the same choices.
+    fn changes(&self, discrete: &[Datum], mut y: &[f64]) -> Vec<(Target, Change)> {
+        let mut discrete = discrete.iter();
+        let mut changes = Vec::with_capacity(self.targets.len());
+        for (t, (_, n)) in self.targets.iter().zip(&self.signature) {
+            if *n == 0 {
+                changes.extend(discrete.next().map(|x| (*t, Change::Set(x.clone()))));
+            } else if let Some((own, rest)) = y.split_at_checked(*n) {
+                changes.push((*t, Change::Free(own.to_vec())));
+                y = rest;
+            }
+        }
+        changes
+    }
+}
+
+impl Found {
+    /// The log density of proposing a place.
+    fn log_density(&self, discrete: &[Datum], y: &[f64]) -> f64 {
+        let near = self.modes.iter().filter(|m| m.discrete == discrete);
+        let logs: Vec<f64> = near.map(|m| m.log_share + m.about.log_density(y)).collect();
+        let most = logs.iter().copied().fold(f64::NEG_INFINITY, f64::max);
+        if most == f64::NEG_INFINITY {
+            return most;
+        }
+        most + libm::log(logs.iter().map(|l| libm::exp(l - most)).sum())
+    }
+
+    fn draw(&self, rng: &mut Stream) -> Option<&Mode> {
+        let mut left = rng.uniform();
+        let one = self.modes.iter().find(|m| {
+            left -= libm::exp(m.log_share);
+            left < 0.0
+        });
+        one.or(self.modes.last())
+    }
+
+    /// From modes with the logs of their evidence.
+    fn new(signature: Vec<(u64, usize)>, mut modes: Vec<Mode>) -> Found {
+        let most = modes.iter().map(|m| m.log_share).fold(f64::NEG_INFINITY, f64::max);
+        let sum: f64 = modes.iter().map(|m| libm::exp(m.log_share - most)).sum();
+        let alike = ALIKE / modes.len().max(1) as f64;
+        for m in &mut modes {
+            m.log_share = libm::log((1.0 - ALIKE) * libm::exp(m.log_share - most) / sum + alike);
+        }
+        Found { signature, modes }
+    }
+}
+
+type State = Vec<(u64, Constraint)>;
+
+impl Modes {
+    /// For these choices: among so many draws from the prior, so many climb, by at most so many steps.
+    pub fn new(scope: Scope, tries: u32, keep: u32, steps: u32) -> Self {
+        Modes { scope: Registered::new(scope), tries, keep, steps, found: None }
+    }
+
+    /// The likeliest of some draws of the choices, the present state among them.
+    fn starts(&mut self, trace: &mut Trace, at: &At) -> TraceResult<Vec<(State, f64)>> {
+        let mut best = vec![(trace.constraints(), trace.log_likelihood())];
+        for i in 0..self.tries {
+            let at = at.within(u64::from(i));
+            let (targets, _) = self.scope.members(trace, &at, &mut at.stream());
+            if recoverable(trace.regenerate(&targets, at.draws(0)))?.is_none() {
+                continue;
+            }
+            trace.commit();
+            let likely = trace.log_likelihood();
+            let place = best.partition_point(|(_, l)| *l >= likely);
+            if likely > f64::NEG_INFINITY && place < self.keep as usize {
+                best.insert(place, (trace.constraints(), likely));
+                best.truncate(self.keep as usize);
+            }
+        }
+        Ok(best)
+    }
+
+    /// Looks for modes, and leaves the trace in one of them.
+    fn search(&mut self, trace: &mut Trace, at: &At) -> TraceResult<()> {
+        let at = &At { power: 1.0, ..*at };
+        let begun = trace.constraints();
+        let mut tops: Vec<(State, f64)> = Vec::new();
+        for (state, _) in self.starts(trace, at)? {
+            trace.restore(&state, at.draws(0))?;
+            let (targets, _) = self.scope.members(trace, at, &mut at.stream());
+            let mut memory = Memory::default();
+            if let Some((mut system, here)) = System::begin(trace, at, &targets, None, &mut memory)? {
+                let top = ascend(&mut system, &here, self.steps)?;
+                system.settle(Some(&top))?;
+            }
+            let log_jacobian = Here::of(trace, &targets).map_or(0.0, |h| h.log_jacobian);
+            tops.push((trace.constraints(), trace.log_joint() + log_jacobian));
+        }
+        tops.sort_by(|a, b| b.1.total_cmp(&a.1));
+        let highest = tops.first().map_or(0.0, |t| t.1);
+        let mut signature = None;
+        let mut modes: Vec<Mode> = Vec::new();
+        for (state, height) in tops.into_iter().filter(|t| t.1 > highest - BEHIND) {
+            if modes.len() == MOST {
+                break;
+            }
+            trace.restore(&state, at.draws(0))?;
+            let (targets, _) = self.scope.members(trace, at, &mut at.stream());
+            let Some(here) = Here::of(trace, &targets) else { continue };
+            let known = |m: &Mode| m.discrete == here.discrete && m.about.distance(&here.y) < 0.25 * here.y.len() as f64;
+            if *signature.get_or_insert_with(|| here.signature.clone()) != here.signature || modes.iter().any(known) {
+                continue;
+            }
+            let Some(about) = curved(trace, at, &targets, here.y)? else { continue };
+            modes.push(Mode { discrete: here.discrete, log_share: height + about.log_volume(), about });
+        }
+        let found = Found::new(signature.unwrap_or_default(), modes);
+        trace.restore(&begun, at.draws(0))?;
+        let (targets, _) = self.scope.members(trace, at, &mut at.stream());
+        if let (Some(here), Some(mode)) = (Here::of(trace, &targets), found.draw(&mut at.stream()))
+            && here.signature == found.signature
+            && recoverable(trace.propose(&here.changes(&mode.discrete, &mode.about.mean), at.draws(1)))?.is_some()
+        {
+            trace.commit();
+        }
+        self.found = Some(found);
+        Ok(())
+    }
+}
+
+/// The Gaussian about a mode, where the trace is.
+fn curved(trace: &mut Trace, at: &At, targets: &[Target], y: Vec<f64>) -> TraceResult<Option<Laplace>> {
+    let mut memory = Memory::default();
+    let Some((mut system, here)) = System::begin(trace, at, targets, None, &mut memory)? else {
+        return Ok(Laplace::new(y, &[]));
+    };
+    let mut curvature = Vec::with_capacity(y.len() * y.len());
+    for i in 0..y.len() {
+        let moved = y.iter().enumerate().map(|(j, y)| if i == j { y + STEP } else { *y });
+        match system.go(moved)? {
+            Some(there) => curvature.extend(here.gradient.iter().zip(&there.gradient).map(|(a, b)| (a - b) / STEP)),
+            None => curvature.extend((0..y.len()).map(|j| f64::from(u8::from(i == j)))),
+        }
+    }
+    system.settle(None)?;
+    Ok(Laplace::new(y, &curvature))
+}
+
+impl Kernel for Modes {
+    fn name(&self) -> String {
+        "modes".into()
+    }
+
+    fn save(&self, _trace: &Trace) -> Vec<u8> {
+        pack(&self.found)
+    }
+
+    fn load(&mut self, state: &[u8]) -> Result<(), StateError> {
+        let found: Option<Found> = unpack(state)?;
+        let sound = |f: &Found| {
+            let n: usize = f.signature.iter().map(|(_, n)| n).sum();
+            f.modes.iter().all(|m| m.about.is_sound() && m.about.mean.len() == n && !m.log_share.is_nan())
+        };
+        if !found.as_ref().is_none_or(sound) {
+            return Err(StateError::new("the modes of the checkpoint are damaged"));
+        }
+        self.found = found;
+        Ok(())
+    }
+
+    fn step(&mut self, trace: &mut Trace, at: &At) -> TraceResult<Outcome> {
+        trace.rollback();
+        if self.found.is_none() && at.adapting {
+            self.search(trace, at)?;
+            return Ok(Outcome::default());
+        }
+        let mut rng = at.stream();
+        let (targets, _) = self.scope.members(trace, at, &mut rng);
+        let (Some(found), Some(here)) = (&self.found, Here::of(trace, &targets)) else { return Ok(Outcome::default()) };
+        let Some(mode) = found.draw(&mut rng).filter(|_| here.signature == found.signature) else {
+            return Ok(Outcome::default());
+        };
+        let y = mode.about.sample(&mut rng);
+        let proposed = trace.propose(&here.changes(&mode.discrete, &y), at.draws(0));
+        let Some(w) = recoverable(proposed)? else { return Ok(Outcome::failed()) };
+        if w.appeared + w.vanished > 0 {
+            trace.rollback();
+            return Ok(Outcome::one(false));
+        }
+        let ways = found.log_density(&here.discrete, &here.y) - found.log_density(&mode.discrete, &y);
+        let ratio = at.tempered(&w) + w.log_jacobian - here.log_jacobian + ways;
+        // Where no mode leads, there is no way back.
+        Ok(settle(trace, if ratio.is_nan() { f64::NEG_INFINITY } else { ratio }, &mut rng))
+    }
+}
