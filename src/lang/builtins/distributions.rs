@@ -11,6 +11,8 @@ use super::{Arg, Args, Kind, Row, Scalar, Type, arg, opt};
 use crate::dist::{self, Dist, FAMILIES, Family, ParamError};
 use crate::lang::error::Fault;
 use crate::lang::value::Value;
+use std::cell::RefCell;
+use std::collections::VecDeque;
 use std::sync::Arc;
 
 const SECTION: &str = "Distributions";
@@ -272,14 +274,50 @@ fn product<const N: usize>(
     dist::Product::new(elements).map(|d| Dist::Product(Arc::new(d))).map_err(fault)
 }
 
+/// The most multivariate normals that a thread remembers.
+const REMEMBERED: usize = 64;
+
+thread_local! {
+    /// By mean and matrix, the very same arrays: factors take long, and a trace asks for the same ones again and again.
+    static NORMALS: RefCell<VecDeque<([Value; 3], bool, Dist)>> = const { RefCell::new(VecDeque::new()) };
+}
+
+/// Whether two values are the same array, not only equal ones.
+fn is_same_array(a: &Value, b: &Value) -> bool {
+    match (a, b) {
+        (Value::Array(a), Value::Array(b)) => Arc::ptr_eq(a, b),
+        (Value::List(a), Value::List(b)) => Arc::ptr_eq(a, b),
+        (Value::Unit, Value::Unit) => true,
+        _ => false,
+    }
+}
+
 fn mv_normal(a: &Args) -> Result<Dist, Fault> {
+    let whitened = a.bool_or(3, false)?;
+    let given = [0, 1, 2].map(|i| a.get(i));
+    NORMALS.with_borrow_mut(|known| {
+        let same = |(of, white, _): &([Value; 3], bool, Dist)| {
+            *white == whitened && of.iter().zip(given).all(|(a, b)| is_same_array(a, b))
+        };
+        if let Some(at) = known.iter().position(same) {
+            return Ok(known[at].2.clone());
+        }
+        let made = new_mv_normal(a, whitened)?;
+        if known.len() == REMEMBERED {
+            known.pop_front();
+        }
+        known.push_back((given.map(Value::clone), whitened, made.clone()));
+        Ok(made)
+    })
+}
+
+fn new_mv_normal(a: &Args, whitened: bool) -> Result<Dist, Fault> {
     let mean = a.array(0)?;
     let made = match (a.given(1), a.given(2)) {
         (true, false) => dist::MvNormal::from_cov(&mean, &square(a, 1, mean.len())?),
         (false, true) => dist::MvNormal::from_chol(&mean, &square(a, 2, mean.len())?),
         _ => return Err(Fault::type_error("mv_normal: give either `cov` or `chol`")),
     };
-    let whitened = a.bool_or(3, false)?;
     let stored = |d: dist::MvNormal| if whitened { d.to_whitened() } else { d };
     made.map(|d| Dist::MvNormal(Arc::new(stored(d)))).map_err(fault)
 }

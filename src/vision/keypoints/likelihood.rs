@@ -5,7 +5,7 @@
 //! off with the probability `outlier`, worthless ones tell nothing. `s^2 = sd^2 + offset^2`: the model's joint may be off, too, and
 //! where the joint really is then lies between it and the detection. A detector that is of several minds gives several places
 //! `z_m` with shares `w_m`, of which one is meant and the others are anywhere:
-//! `((1 - e) sum_m w_m N(z_m; p, s^2 I) + e / area) / area^(M - 1)`. A share of good detections may be near misses, with 8 times the
+//! `((1 - e) sum_m w_m N(z_m; p, s^2 I) + e / area) / area^(M - 1)`. A share of joints may be missed by the model, with 8 times the
 //! spread: so a body that is far off still feels where its joints were seen. Invariant: finite and never NaN, as `e > 0`.
 
 use crate::rng::Stream;
@@ -33,11 +33,11 @@ pub struct KeypointOptions {
     pub offset: f64,
     /// What these are given in.
     pub unit: Unit,
-    /// The share of near misses among good detections; from 0 to less than 1.
+    /// The share of joints that the model has further off; from 0 to less than 1.
     pub misses: f64,
 }
 
-/// How much wider near misses are spread.
+/// How much wider detections are spread about joints that the model misses: it is the model that is off.
 const MISS: f64 = 8.0;
 
 impl Default for KeypointOptions {
@@ -187,11 +187,14 @@ impl KeypointLikelihood {
     pub fn located(&self, seen: &Detection, joint: [f64; 2]) -> ([f64; 2], f64) {
         let (shares, off) = self.shares(seen, joint);
         let between = self.offset * self.offset;
-        // Of the mixture of good detections, near misses and none: within each, and between them.
+        let own = (self.sd * self.sd - between).max(0.0);
+        // Of the mixture of joints that the model has, those it misses and detections that are off: within each, and between them.
         let (mut shift, mut square, mut within) = ([0.0; 2], 0.0, off * between);
         for ((at, _), both) in seen.places.iter().zip(shares) {
             for (share, wider) in both.into_iter().zip([1.0, MISS]).filter(|(share, _)| *share > 0.0) {
-                let weight = between / (wider * wider * self.sd * self.sd);
+                let both = wider * wider * self.sd * self.sd;
+                let between = both - own;
+                let weight = between / both;
                 let to = [0, 1].map(|i| weight * (at[i] - joint[i]));
                 (0..2).for_each(|i| shift[i] += share * to[i]);
                 square += share * (to[0] * to[0] + to[1] * to[1]);

@@ -41,7 +41,7 @@ pub(super) const TABLE: &[Row] = &[native(
             "What `sd` and `offset` are given in: \"diagonal\", percent of the picture's; \"torso\", lengths of the detected torso.",
         ),
         opt("confidence", Type::Bool, "true", "Whether a detection that is not sure is the more often off."),
-        opt("misses", Type::Num, "0", "The share of near misses among the others: they have 8 times the spread."),
+        opt("misses", Type::Num, "0", "The share of joints that the scene has further off: by 8 times the spread."),
     ],
     Type::Likelihood,
     "The density of detected joints: each near its landmark or anywhere in the picture; what was not found says nothing.",
