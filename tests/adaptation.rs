@@ -70,6 +70,7 @@ const CASES: &[(&str, &str, &str, Of)] = &[
     ("abc", COUNTS, "abc(drift(@p), eps = 0.5);", Of::Distance(&Of::All)),
     ("abc", COUNTS, "abc(drift(@p), eps = 0.5, particles = 6);", Of::Particles(&Of::All)),
     ("optimize", MODEL, "optimize(@a + @b, steps = 2);", Of::Nothing),
+    ("modes", MODEL, "modes(@**, tries = 20, keep = 4, steps = 10); mh(one(@**));", Of::All),
     ("shift", MODEL, "shift(0.5);", Of::All),
     ("mirror", MODEL, "mirror();", Of::All),
 ];

@@ -18,6 +18,7 @@ use pcadlang::bank::{Features, Learn, learn};
 use pcadlang::report::npy;
 use std::io::Cursor;
 use std::path::{Path, PathBuf};
+use std::sync::LazyLock;
 use std::sync::atomic::AtomicU64;
 
 use serde_json::json;
@@ -83,7 +84,8 @@ fn pictures() -> Vec<Vec<u8>> {
     ]
 }
 
-fn a_bank() -> Vec<u8> {
+/// Made once: its folder is everyone's.
+static A_BANK: LazyLock<Vec<u8>> = LazyLock::new(|| {
     let text = "include \"std/scene.pcad\" as scene; assume r ~ uniform(0.3, 1); assume w ~ iid(flip(0.5), 2);
         assume view = scene.render(scene.sphere(r, sides = 8));";
     let model = Program::parse(text).and_then(Program::compile).unwrap();
@@ -92,7 +94,7 @@ fn a_bank() -> Vec<u8> {
     let how = Learn { name: "x", count: 3, seed: 1, threads: 1, features: Features::Contours { size: 16 } };
     learn(&model, &how, &path, &AtomicU64::new(0)).unwrap();
     std::fs::read(path).unwrap()
-}
+});
 
 /// A triangle on a joint, as `.glb`, and as `.gltf` with its buffer within and beside.
 fn bodies() -> Vec<Vec<u8>> {
@@ -190,7 +192,7 @@ fn seeds_of(target: &str) -> Vec<Vec<u8>> {
             let model = targets::traced();
             (0..5).map(|i| serde_json::to_vec(&model.simulate(i, 0).unwrap().save(model.hash())).unwrap()).collect()
         }
-        "bank" => vec![a_bank()],
+        "bank" => vec![A_BANK.clone()],
         "checkpoint" => targets::checkpoints(None).into_iter().step_by(9).collect(),
         "keypoints" => people(),
         "table" => texts(&[

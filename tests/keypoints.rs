@@ -9,7 +9,6 @@ use pcadlang::lang::value::Value;
 use pcadlang::vision::Photo;
 use pcadlang::vision::keypoints::{Detection, Keypoint, KeypointLikelihood, KeypointOptions, Keypoints, People};
 use pcadlang::{Model, Program, RunOptions};
-use std::sync::Arc;
 
 /// A bar with two ends that can be moved in the picture plane.
 const BAR: &str = "include \"std/scene.pcad\" as scene;

@@ -6,6 +6,7 @@ use pcadlang::lang::builtins::scene::ViewValue;
 use pcadlang::lang::code::Operand;
 use pcadlang::report::Moments;
 use pcadlang::trace::{Draws, Trace};
+use serde::{Deserialize, Serialize};
 use serde_json::{Map, Value, json};
 use std::sync::{Arc, Mutex, MutexGuard, PoisonError};
 
@@ -21,7 +22,17 @@ pub struct Joints {
 struct Chain {
     /// Where the view is: looked for once.
     view: Option<Option<Operand>>,
-    moments: Moments,
+    seen: Seen,
+}
+
+/// What draws say of landmarks.
+#[derive(Clone, Debug, Default, Serialize, Deserialize)]
+struct Seen {
+    /// Where the joints are in the picture: between the scene's and where they were detected.
+    joints: Moments,
+    /// Where the scene's own are in the picture, and in the scene.
+    own: Moments,
+    scene: Moments,
 }
 
 impl Joints {
@@ -39,11 +50,18 @@ impl Joints {
         self.size.unwrap_or((view.0.camera().width, view.0.camera().height))
     }
 
-    /// Means and spreads over all draws of all chains so far.
+    /// Means and spreads of where the joints are, over all draws of all chains so far.
     pub fn moments(&self) -> Moments {
-        let mut all = Moments::default();
+        self.all().joints
+    }
+
+    fn all(&self) -> Seen {
+        let mut all = Seen::default();
         for chain in self.chains.iter() {
-            all.merge(&chain.lock().unwrap_or_else(PoisonError::into_inner).moments);
+            let Seen { joints, own, scene } = &chain.lock().unwrap_or_else(PoisonError::into_inner).seen;
+            all.joints.merge(joints);
+            all.own.merge(own);
+            all.scene.merge(scene);
         }
         all
     }
@@ -61,13 +79,23 @@ impl Joints {
         if best.is_empty() {
             return None;
         }
-        let all = self.moments();
-        let numbers = |xs: &[f64]| xs.iter().map(|x| rounded(*x)).collect::<Value>();
-        let keypoints: Map<String, Value> =
-            all.iter().map(|(name, p)| (name.to_owned(), numbers(&[p.mean[0], p.mean[1], p.sd()]))).collect();
+        let numbers = |xs: &mut dyn Iterator<Item = f64>| xs.map(rounded).collect::<Value>();
+        let spread = |m: &Moments| -> Map<String, Value> {
+            let each = m.iter().map(|(name, p)| {
+                (name.to_owned(), numbers(&mut p.mean.iter().copied().chain([p.sd()])))
+            });
+            each.collect()
+        };
+        let Seen { joints, own, scene } = self.all();
         let best: Map<String, Value> =
-            best.iter().filter_map(|(name, at)| Some((name.to_string(), numbers(&(*at)?)))).collect();
-        Some(json!({ "keypoints": keypoints, "best": best, "seconds": rounded(seconds) }))
+            best.iter().filter_map(|(name, at)| Some((name.to_string(), numbers(&mut (*at)?.into_iter())))).collect();
+        Some(json!({
+            "keypoints": spread(&joints),
+            "body": spread(&own),
+            "scene": spread(&scene),
+            "best": best,
+            "seconds": rounded(seconds),
+        }))
     }
 }
 
@@ -78,12 +106,12 @@ fn rounded(x: f64) -> Value {
 
 impl Watch for Joints {
     fn save(&self, chain: u32) -> Vec<u8> {
-        self.chain(chain).and_then(|c| serde_json::to_vec(&c.moments).ok()).unwrap_or_default()
+        self.chain(chain).and_then(|c| serde_json::to_vec(&c.seen).ok()).unwrap_or_default()
     }
 
     fn load(&self, chain: u32, state: &[u8]) -> Result<(), StateError> {
         if let Some(mut chain) = self.chain(chain) {
-            chain.moments = serde_json::from_slice(state).map_err(|e| StateError(e.to_string()))?;
+            chain.seen = serde_json::from_slice(state).map_err(|e| StateError(e.to_string()))?;
         }
         Ok(())
     }
@@ -96,13 +124,18 @@ impl Watch for Joints {
         let found = trace.located();
         let (width, height) = self.pixels(view);
         let (width, height) = (f64::from(width), f64::from(height));
-        for (name, at) in self.positions(view) {
+        let seen = &mut chain.seen;
+        for (landmark, (name, at)) in view.0.solid().landmarks().iter().zip(self.positions(view)) {
+            seen.scene.add(&name, &landmark.position.to_array(), 0.0);
+            if let Some(at) = at {
+                seen.own.add(&name, &at, 0.0);
+            }
             match (found.iter().find(|l| l.name == name), at) {
                 (Some(l), _) => {
                     let diagonal = width * width + height * height;
-                    chain.moments.add(&name, [l.at[0] * width, l.at[1] * height], l.variance * diagonal);
+                    seen.joints.add(&name, &[l.at[0] * width, l.at[1] * height], l.variance * diagonal);
                 }
-                (None, Some(at)) => chain.moments.add(&name, at, 0.0),
+                (None, Some(at)) => seen.joints.add(&name, &at, 0.0),
                 (None, None) => {}
             }
         }

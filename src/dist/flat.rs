@@ -13,11 +13,14 @@ pub struct Flat {
 
 impl Default for Flat {
     fn default() -> Self {
-        Flat { lo: f64::NEG_INFINITY, hi: f64::INFINITY }
+        Flat::EVERYWHERE
     }
 }
 
 impl Flat {
+    /// Over all numbers.
+    pub const EVERYWHERE: Flat = Flat { lo: f64::NEG_INFINITY, hi: f64::INFINITY };
+
     /// Between these bounds, at least one of them infinite; fails for others, and for bounds that leave nothing.
     pub fn new(lo: f64, hi: f64) -> Result<Flat, ParamError> {
         let bad = |rule| Err(ParamError::new(Self::NAME, "lo to hi", format!("{lo} and {hi}"), rule));

@@ -2,7 +2,7 @@
 
 use super::expr::{Scope, evaluate};
 use super::foreign::build_foreign;
-use super::kernel::Kernel;
+use super::kernel::{self, Kernel};
 use super::kernels::{
     Abc, AbcSmc, Block, Delayed, Drift, Elliptical, Gibbs, Hmc, Knn, Mh, Modes, Nuts, Optimize, Own, Slice, Smc, Temper,
 };
@@ -134,7 +134,10 @@ pub(super) fn build(
             let tries = whole(argument(args, 1, "tries"), "tries", 200, 1, 1_000_000, env)?;
             let keep = whole(argument(args, 2, "keep"), "keep", 16, 1, 1000, env)?;
             let steps = whole(argument(args, 3, "steps"), "steps", 60, 1, 1_000_000, env)?;
-            Box::new(Modes::new(scope, tries, keep, steps))
+            let first = argument(args, 4, "first").map(|e| self::scope(e, env)).transpose()?;
+            let first = first.map(|s| kernel::Scope { selector: without(s.selector, frozen), ..s });
+            let coarse = argument(args, 5, "at").map_or(Ok(Selector::Nothing), |e| selector(e, env))?;
+            Box::new(Modes::new(scope, tries, keep, steps).climbing_first(first).by_surrogates_of(coarse))
         }
         _ => return Err(fail(e.span, format!("`{name}` is no kernel"))),
     };

@@ -1,6 +1,6 @@
 //! Densities of values of the language and their derivatives: what observations and choices are scored by, whatever scores them.
 
-use crate::dist::{Datum, Dist};
+use crate::dist::{Datum, Dist, Flat};
 use crate::lang::adjoint::Adjoint;
 use crate::lang::builtins::{Args, CovarianceValue};
 use crate::lang::error::Fault;
@@ -16,6 +16,11 @@ pub(crate) enum Score {
     One(f64),
     /// One an element.
     Sum(ExactSum),
+}
+
+/// Whether it is flat over everything, so that it may be of what is no number: as a surrogate, it leaves an observation out.
+fn tells_nothing(dist: &Dist) -> bool {
+    matches!(dist, Dist::Flat(f) if *f == Flat::EVERYWHERE)
 }
 
 /// The log density of an observed value under a likelihood.
@@ -57,6 +62,7 @@ pub(crate) fn score(dist: &Dist, observed: &Value) -> Result<Score, Fault> {
         }
         Value::List(xs) => sum_scores(xs.len(), |i| xs[i].to_datum().map(|x| dist.log_density(&x)).ok_or_else(wrong)),
         Value::Array(xs) => Ok(Score::One(dist.log_density(&Datum::Vec(Arc::clone(xs))))),
+        Value::Object(_) if tells_nothing(dist) => Ok(Score::One(0.0)),
         _ => Err(wrong()),
     }
 }
@@ -91,6 +97,9 @@ pub(crate) fn gradient(dist: &Dist, value: &Value) -> Option<(Adjoint, Vec<f64>)
             accumulate(&mut params, &own);
         }
         return Some((Adjoint::List(by_x), params));
+    }
+    if matches!(value, Value::Object(_)) && tells_nothing(dist) {
+        return Some((Adjoint::Zero, vec![0.0; dist.param_count()]));
     }
     let g = dist.gradient(&value.to_datum()?)?;
     let mut rest = &g.x[..];

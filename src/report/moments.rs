@@ -1,4 +1,4 @@
-//! Means and variances of named points of the plane, one draw at a time and merged over chains.
+//! Means and variances of named points of the plane or of space, one draw at a time and merged over chains.
 //!
 //! Invariant: the same draws in the same order give the same bits, and merging chains in order does not depend on when they
 //! ran.
@@ -8,21 +8,21 @@ use serde::{Deserialize, Serialize};
 use std::sync::Arc;
 
 /// One point's draws so far.
-#[derive(Clone, Copy, Debug, Default, PartialEq, Serialize, Deserialize)]
+#[derive(Clone, Debug, Default, PartialEq, Serialize, Deserialize)]
 pub struct Point {
     /// The number of draws.
     pub count: u64,
-    /// Their mean.
-    pub mean: [f64; 2],
+    /// Their mean, by axis.
+    pub mean: Vec<f64>,
     /// Sums of squares about it.
-    squares: [f64; 2],
+    squares: Vec<f64>,
 }
 
 impl Point {
-    /// The square root of the mean of the two variances; 0 of a single draw.
+    /// The square root of the mean of the variances along the axes; 0 of a single draw.
     pub fn sd(&self) -> f64 {
-        let [x, y] = self.squares;
-        (0.5 * (x + y) / self.count.saturating_sub(1).max(1) as f64).sqrt()
+        let mean = self.squares.iter().sum::<f64>() / self.squares.len().max(1) as f64;
+        (mean / self.count.saturating_sub(1).max(1) as f64).sqrt()
     }
 
     fn merge(&mut self, o: &Point) {
@@ -31,25 +31,30 @@ impl Point {
         if all == 0.0 {
             return;
         }
-        for i in 0..2 {
-            let d = o.mean[i] - self.mean[i];
-            self.mean[i] += d * (m / all);
-            self.squares[i] += o.squares[i] + d * d * (n * m / all);
+        if self.count == 0 {
+            self.clone_from(o);
+            return;
+        }
+        let axes = self.mean.iter_mut().zip(&mut self.squares);
+        for ((mean, squares), (other, others)) in axes.zip(o.mean.iter().zip(&o.squares)) {
+            let d = other - *mean;
+            *mean += d * (m / all);
+            *squares += others + d * d * (n * m / all);
         }
         self.count += o.count;
     }
 }
 
-/// Points by name, in order of first appearance. A point need not be in every draw.
+/// Points by name, in order of first appearance, each of as many axes in all draws. A point need not be in every draw.
 #[derive(Clone, Debug, Default, Serialize, Deserialize)]
 pub struct Moments(IndexMap<Arc<str>, Point>);
 
 impl Moments {
     /// Takes a point of a draw (Welford 1962), or the mean and variance of what the draw says of it; one that is not finite is
     /// left out.
-    pub fn add(&mut self, name: &Arc<str>, at: [f64; 2], variance: f64) {
+    pub fn add(&mut self, name: &Arc<str>, at: &[f64], variance: f64) {
         if at.iter().all(|x| x.is_finite()) && variance.is_finite() {
-            let one = Point { count: 1, mean: at, squares: [variance; 2] };
+            let one = Point { count: 1, mean: at.to_vec(), squares: vec![variance; at.len()] };
             self.0.entry(Arc::clone(name)).or_default().merge(&one);
         }
     }
@@ -77,12 +82,12 @@ mod tests {
         let draws: Vec<[f64; 2]> = (0..50).map(|i| [1e6 + f64::from(i * i % 17), f64::from(i % 5) - 2.0]).collect();
         let of = |draws: &[[f64; 2]]| {
             let mut m = Moments::default();
-            draws.iter().for_each(|d| m.add(&name, *d, 0.0));
+            draws.iter().for_each(|d| m.add(&name, d, 0.0));
             m
         };
         let mut merged = of(&draws[..13]);
         merged.merge(&of(&draws[13..]));
-        merged.add(&name, [f64::NAN, 0.0], 0.0);
+        merged.add(&name, &[f64::NAN, 0.0], 0.0);
         merged.merge(&Moments::default());
         let n = draws.len() as f64;
         let mean = [0, 1].map(|i| draws.iter().map(|d| d[i]).sum::<f64>() / n);

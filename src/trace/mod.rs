@@ -581,21 +581,3 @@ impl Trace {
         stored.map(|(h, d)| (h, Constraint::Stored(d))).collect()
     }
 }
-
-impl Graph {
-    fn query(&mut self, code: &Code, operands: &[Operand]) -> TraceResult<Vec<Value>> {
-        let mut values = Vec::with_capacity(operands.len());
-        for o in operands {
-            if let Some(n) = self.resolve(0, *o) {
-                self.demand(code, n)?;
-            }
-            if let Value::Container(r) = self.value(code, 0, *o) {
-                let gather = r.node + 1;
-                self.demand(code, gather)?;
-            }
-            let mut deps = node::Deps::new();
-            values.push(self.plain(code, 0, *o, &mut deps).clone());
-        }
-        Ok(values)
-    }
-}

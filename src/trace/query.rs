@@ -1,8 +1,10 @@
 //! Asking a trace for what no observation asks for: values of expressions and names, surrogates of observations. What that
 //! draws is forgotten again.
 
+use super::graph::Graph;
+use super::node::Deps;
 use super::{Address, Draws, Trace, TraceResult};
-use crate::lang::code::Operand;
+use crate::lang::code::{Code, Operand};
 use crate::lang::value::Value;
 
 impl Trace {
@@ -77,5 +79,23 @@ impl Trace {
         let result = self.graph.surrogate_score(&self.code, n);
         self.graph.rollback(&self.code, before);
         result
+    }
+}
+
+impl Graph {
+    pub(super) fn query(&mut self, code: &Code, operands: &[Operand]) -> TraceResult<Vec<Value>> {
+        let mut values = Vec::with_capacity(operands.len());
+        for o in operands {
+            if let Some(n) = self.resolve(0, *o) {
+                self.demand(code, n)?;
+            }
+            if let Value::Container(r) = self.value(code, 0, *o) {
+                let gather = r.node + 1;
+                self.demand(code, gather)?;
+            }
+            let mut deps = Deps::new();
+            values.push(self.plain(code, 0, *o, &mut deps).clone());
+        }
+        Ok(values)
     }
 }

@@ -36,6 +36,7 @@ pub mod exact {
         "slice(@x, width = 0.1, doubling = true)",
         "slice(@x, width = 1.5, doubling = true)",
         "slice(@x, width = 30, doubling = true)",
+        "modes(@x, tries = 30, keep = 8, steps = 20)",
     ];
     /// With a surrogate that says something else.
     pub const DELAYED: &[&str] = &[
@@ -73,6 +74,7 @@ pub mod exact {
     pub const BRANCHES: &[&str] = &[
         "mh(one(@**));",
         "gibbs(@c); drift(@x);",
+        "modes($continuous, tries = 20, keep = 4, steps = 10); mh(one(@**));",
         "block(@**);",
         "mh(@c); elliptical(one($gaussian));",
         "temper(mh(one(@**)), levels = 3);",
@@ -121,6 +123,7 @@ pub mod balance {
         "hmc(@**, steps = 3)",
         "mala(@**)",
         "nuts(@**)",
+        with_mh!("modes(@**, tries = 20, keep = 4, steps = 10)"),
         "slice(one(@**))",
         with_mh!("slice(@p1, width = 2)"),
         "slice(one(@**), width = 0.2, doubling = true)",

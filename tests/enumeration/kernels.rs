@@ -26,6 +26,7 @@ pub const CONTINUOUS: &[&str] = &[
     "mala($continuous);",
     "nuts($continuous, max_depth = 4);",
     "nuts(one($continuous), max_depth = 3);",
+    "modes($continuous, tries = 10, keep = 3, steps = 10);",
 ];
 /// Kernels within `delayed`, which they are all run in.
 pub const REVERSIBLE: &[&str] = &["mh(one(@**))", "gibbs(one($finite))", "block(@**)", "drift(one(@**), 0.7)"];

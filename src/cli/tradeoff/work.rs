@@ -171,7 +171,7 @@ fn scores(truth: &Truth, ready: &Ready, s: &Snapshot, joints: &Joints) -> IndexM
         }
         Truth::Joints(truth) => {
             let mut found: IndexMap<String, [f64; 2]> =
-                s.joints.iter().map(|(name, p)| (name.to_owned(), p.mean)).collect();
+                s.joints.iter().filter_map(|(name, p)| Some((name.to_owned(), *p.mean.first_chunk()?))).collect();
             // Before the first draw the best state speaks.
             if let Some(view) = best_view(ready, s).filter(|_| found.is_empty()) {
                 let at = joints.positions(&ViewValue(view)).into_iter();

@@ -202,6 +202,18 @@ impl Armature {
     /// # Errors
     /// A morph it does not have, an amount that is not finite.
     pub fn shaped(&self, amounts: &[(&str, f64)]) -> Result<Armature, GeomError> {
+        self.clothed(amounts, 0.0)
+    }
+
+    /// As [`Armature::shaped`], with the surface so far off along its normals, those at rest before any change of shape; in the
+    /// mesh's units. Joints and keypoints stay where they are.
+    ///
+    /// # Errors
+    /// As [`Armature::shaped`]; cloth that is not finite.
+    pub fn clothed(&self, amounts: &[(&str, f64)], cloth: f64) -> Result<Armature, GeomError> {
+        if !cloth.is_finite() {
+            return Err(GeomError::domain("the cloth must be finite"));
+        }
         let n = self.rig.joints().len();
         let (mut heads, mut tails) = (vec![DVec3::ZERO; n], vec![DVec3::ZERO; n]);
         let mut points = vec![DVec3::ZERO; self.rig.keypoints().len()];
@@ -225,6 +237,10 @@ impl Armature {
         Ok(self.reshaped(&heads, &tails, &points, move |positions| {
             for (k, amount) in added {
                 skin.morphs[k].move_vertices(amount, positions);
+            }
+            if cloth != 0.0 {
+                let normals = &skin.rest.normals;
+                positions.iter_mut().zip(normals).for_each(|(p, n)| *p += *n * cloth as f32);
             }
         }))
     }
@@ -281,6 +297,11 @@ impl Armature {
         let points = self.skin.anchors.iter().zip(&by.keypoints).map(|(anchor, g)| m.at(*anchor).dot(*g));
         let vertices = m.vertices.iter().zip(&by.vertices).map(|(d, g)| d.as_dvec3().dot(*g));
         Some(dot(&m.heads, &by.heads) + dot(&m.tails, &by.tails) + points.sum::<f64>() + vertices.sum::<f64>())
+    }
+
+    /// From the derivatives by the body at rest to that by its cloth; see [`Armature::clothed`].
+    pub fn pull_cloth(&self, by: &RestGradient) -> f64 {
+        self.skin.rest.normals.iter().zip(&by.vertices).map(|(n, g)| n.as_dvec3().dot(*g)).sum()
     }
 
     /// From derivatives by the vertices of a posed body's meshes in turn to those by the body's own; the parts share some.

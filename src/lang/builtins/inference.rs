@@ -184,11 +184,14 @@ pub(super) const TABLE: &[Row] = &[
             opt("tries", Type::Int, "200", "Draws from the prior among which starts are looked for."),
             opt("keep", Type::Int, "16", "How many of them, the likeliest, climb to a mode."),
             opt("steps", Type::Int, "60", "The most steps of a climb."),
+            opt("first", Type::Selection, "none", "Choices that climb alone in each draw, some steps, before draws are compared."),
+            opt("at", Type::Selection, "none", "Observations in whose place their coarse surrogates stand while modes are looked for."),
         ],
         Type::Kernel,
-        "Jumps between modes. Its first step, in warm-up, looks for them: the likeliest of some draws of the selected choices climb by \
-         L-BFGS, and the state becomes one of the modes, drawn by the Laplace estimates of their evidence. From then on all selected \
-         choices are proposed together from the Laplace approximations of all modes (independent Metropolis-Hastings, Tierney 1994).",
+        "Jumps between modes. Its first step looks for them: the likeliest of some draws of the selected choices climb by L-BFGS, of \
+         which half, and half again, go on to the top; in warm-up the state then becomes one of the modes, drawn by the Laplace estimates \
+         of their evidence. From then on all selected choices are proposed together from the Laplace approximations of all modes \
+         (independent Metropolis-Hastings, Tierney 1994).",
     ),
     name(
         "optimize",

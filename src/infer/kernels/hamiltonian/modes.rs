@@ -1,24 +1,28 @@
 //! `modes(sel)`: independent Metropolis-Hastings from the Laplace approximations of modes that were found before.
 //!
-//! The first step in warm-up looks for modes. From then on the mixture of their approximations is fixed, so that proposing from it is
-//! exact whatever it misses: what it misses is only visited by other kernels. Weighing modes by their evidence makes a chain
-//! begin where the mass is, and not where it happened to climb.
+//! The first step looks for modes. From then on the mixture of their approximations is fixed, so that proposing from it is exact
+//! whatever it misses: what it misses is only visited by other kernels. In warm-up that step also takes the chain to one of the modes,
+//! drawn by their evidence: so it begins where the mass is, and not where it happened to climb.
 
 use super::laplace::Laplace;
-use super::optimize::ascend;
+use super::optimize::{Past, ascend};
 use super::{Memory, System};
 use crate::dist::Datum;
 use crate::infer::kernel::{At, Kernel, Outcome, Registered, Scope, recoverable, settle};
 use crate::infer::state::{StateError, pack, unpack};
 use crate::rng::Stream;
-use crate::trace::{Change, Constraint, Target, Trace, TraceResult};
+use crate::trace::{Change, Constraint, Selector, Target, Trace, TraceResult};
 use serde::{Deserialize, Serialize};
 
 /// The step of the differences that curvatures are taken from.
 const STEP: f64 = 1e-4;
 /// Modes that are this much less likely than the best, in nats, are left out; and at most so many are kept.
 const BEHIND: f64 = 30.0;
-const MOST: usize = 12;
+const MOST: usize = 6;
+/// Climbs whose heights differ by less, in nats, are of the same mode.
+const SAME: f64 = 1e-6;
+/// How many steps the choices climb that climb first.
+const FIRST: u32 = 8;
 /// The share of proposals that go to all modes alike: evidence is an estimate.
 const ALIKE: f64 = 0.1;
 
@@ -45,6 +49,10 @@ pub struct Modes {
     tries: u32,
     keep: u32,
     steps: u32,
+    /// What climbs alone in each draw.
+    first: Option<Registered>,
+    /// The observations whose surrogates the search goes by.
+    coarse: Selector,
     found: Option<Found>,
 }
 
@@ -131,15 +139,38 @@ impl Found {
 
 type State = Vec<(u64, Constraint)>;
 
+/// A climb that is under way.
+struct Climb {
+    state: State,
+    /// The log density in the unconstrained space.
+    height: f64,
+    past: Past,
+}
+
 impl Modes {
     /// For these choices: among so many draws from the prior, so many climb, by at most so many steps.
     pub fn new(scope: Scope, tries: u32, keep: u32, steps: u32) -> Self {
-        Modes { scope: Registered::new(scope), tries, keep, steps, found: None }
+        Modes { scope: Registered::new(scope), tries, keep, steps, first: None, coarse: Selector::Nothing, found: None }
     }
 
-    /// The likeliest of some draws of the choices, the present state among them.
-    fn starts(&mut self, trace: &mut Trace, at: &At) -> TraceResult<Vec<(State, f64)>> {
-        let mut best = vec![(trace.constraints(), trace.log_likelihood())];
+    /// With choices that climb alone in each draw, some steps, before draws are compared.
+    #[must_use]
+    pub fn climbing_first(self, first: Option<Scope>) -> Self {
+        Modes { first: first.map(Registered::new), ..self }
+    }
+
+    /// With observations in whose place their coarse surrogates stand while modes are looked for.
+    #[must_use]
+    pub fn by_surrogates_of(self, coarse: Selector) -> Self {
+        Modes { coarse, ..self }
+    }
+
+    /// The likeliest of some draws of the choices; in warm-up the present state is among them.
+    fn starts(&mut self, trace: &mut Trace, at: &At) -> TraceResult<Vec<Climb>> {
+        let mut best = Vec::new();
+        if at.adapting {
+            best.push((trace.constraints(), trace.log_likelihood()));
+        }
         for i in 0..self.tries {
             let at = at.within(u64::from(i));
             let (targets, _) = self.scope.members(trace, &at, &mut at.stream());
@@ -147,6 +178,10 @@ impl Modes {
                 continue;
             }
             trace.commit();
+            if let Some(first) = &mut self.first {
+                let (targets, _) = first.members(trace, &at, &mut at.stream());
+                climb(trace, &at, &targets, FIRST, &mut Past::new())?;
+            }
             let likely = trace.log_likelihood();
             let place = best.partition_point(|(_, l)| *l >= likely);
             if likely > f64::NEG_INFINITY && place < self.keep as usize {
@@ -154,33 +189,52 @@ impl Modes {
                 best.truncate(self.keep as usize);
             }
         }
-        Ok(best)
+        let climb = |(state, height)| Climb { state, height, past: Past::new() };
+        Ok(best.into_iter().map(climb).collect())
     }
 
-    /// Looks for modes, and leaves the trace in one of them.
+    /// The ends of climbs, the highest first. Half of them go on after a quarter of the steps, and a quarter after half of them
+    /// (successive halving: Jamieson & Talwalkar 2016).
+    fn tops(&mut self, trace: &mut Trace, at: &At) -> TraceResult<Vec<Climb>> {
+        let mut climbs = self.starts(trace, at)?;
+        let mut gone = 0;
+        for (round, share) in [4, 2, 1].into_iter().enumerate() {
+            let steps = self.steps / share - gone;
+            gone += steps;
+            for c in &mut climbs {
+                trace.restore(&c.state, at.draws(0))?;
+                let (targets, _) = self.scope.members(trace, at, &mut at.stream());
+                climb(trace, at, &targets, steps, &mut c.past)?;
+                let log_jacobian = Here::of(trace, &targets).map_or(0.0, |h| h.log_jacobian);
+                (c.state, c.height) = (trace.constraints(), trace.log_joint() + log_jacobian);
+            }
+            climbs.sort_by(|a, b| b.height.total_cmp(&a.height));
+            climbs.dedup_by(|b, a| a.height - b.height < SAME);
+            climbs.truncate(self.keep.div_ceil(2 << round) as usize);
+        }
+        Ok(climbs)
+    }
+
+    /// Looks for modes, and in warm-up leaves the trace in one of them.
+    fn begin(&mut self, trace: &mut Trace, at: &At) -> TraceResult<()> {
+        let coarse = if self.coarse == Selector::Nothing { None } else { trace.under_surrogates(&self.coarse)? };
+        let Some(mut twin) = coarse else { return self.search(trace, at) };
+        twin.observe_as(trace)?;
+        self.search(&mut twin, at)?;
+        trace.propose_choices_of(&twin)?;
+        trace.commit();
+        Ok(())
+    }
+
+    /// Looks for modes of a trace, and in warm-up leaves it in one of them.
     fn search(&mut self, trace: &mut Trace, at: &At) -> TraceResult<()> {
         let at = &At { power: 1.0, ..*at };
         let begun = trace.constraints();
-        let mut tops: Vec<(State, f64)> = Vec::new();
-        for (state, _) in self.starts(trace, at)? {
-            trace.restore(&state, at.draws(0))?;
-            let (targets, _) = self.scope.members(trace, at, &mut at.stream());
-            let mut memory = Memory::default();
-            if let Some((mut system, here)) = System::begin(trace, at, &targets, None, &mut memory)? {
-                let top = ascend(&mut system, &here, self.steps)?;
-                system.settle(Some(&top))?;
-            }
-            let log_jacobian = Here::of(trace, &targets).map_or(0.0, |h| h.log_jacobian);
-            tops.push((trace.constraints(), trace.log_joint() + log_jacobian));
-        }
-        tops.sort_by(|a, b| b.1.total_cmp(&a.1));
-        let highest = tops.first().map_or(0.0, |t| t.1);
+        let tops = self.tops(trace, at)?;
+        let highest = tops.first().map_or(0.0, |t| t.height);
         let mut signature = None;
         let mut modes: Vec<Mode> = Vec::new();
-        for (state, height) in tops.into_iter().filter(|t| t.1 > highest - BEHIND) {
-            if modes.len() == MOST {
-                break;
-            }
+        for Climb { state, height, .. } in tops.into_iter().filter(|t| t.height > highest - BEHIND).take(MOST) {
             trace.restore(&state, at.draws(0))?;
             let (targets, _) = self.scope.members(trace, at, &mut at.stream());
             let Some(here) = Here::of(trace, &targets) else { continue };
@@ -194,7 +248,8 @@ impl Modes {
         let found = Found::new(signature.unwrap_or_default(), modes);
         trace.restore(&begun, at.draws(0))?;
         let (targets, _) = self.scope.members(trace, at, &mut at.stream());
-        if let (Some(here), Some(mode)) = (Here::of(trace, &targets), found.draw(&mut at.stream()))
+        if at.adapting
+            && let (Some(here), Some(mode)) = (Here::of(trace, &targets), found.draw(&mut at.stream()))
             && here.signature == found.signature
             && recoverable(trace.propose(&here.changes(&mode.discrete, &mode.about.mean), at.draws(1)))?.is_some()
         {
@@ -203,6 +258,16 @@ impl Modes {
         self.found = Some(found);
         Ok(())
     }
+}
+
+/// Takes the continuous ones of some choices so many steps up; without a slope they stay.
+fn climb(trace: &mut Trace, at: &At, targets: &[Target], steps: u32, past: &mut Past) -> TraceResult<()> {
+    let mut memory = Memory::default();
+    if let Some((mut system, here)) = System::begin(trace, at, targets, None, &mut memory)? {
+        let top = ascend(&mut system, &here, steps, past)?;
+        system.settle(Some(&top))?;
+    }
+    Ok(())
 }
 
 /// The Gaussian about a mode, where the trace is.
@@ -247,8 +312,8 @@ impl Kernel for Modes {
 
     fn step(&mut self, trace: &mut Trace, at: &At) -> TraceResult<Outcome> {
         trace.rollback();
-        if self.found.is_none() && at.adapting {
-            self.search(trace, at)?;
+        if self.found.is_none() {
+            self.begin(trace, at)?;
             return Ok(Outcome::default());
         }
         let mut rng = at.stream();

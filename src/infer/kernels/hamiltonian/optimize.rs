@@ -22,10 +22,14 @@ pub struct Optimize {
 }
 
 /// A step and the change of the gradient over it.
-struct Pair {
+#[derive(Clone, Debug)]
+pub(super) struct Pair {
     step: Vec<f64>,
     change: Vec<f64>,
 }
+
+/// The last steps of a climb, which go on counting when it is interrupted.
+pub(super) type Past = VecDeque<Pair>;
 
 impl Optimize {
     /// The kernel for these choices, with at most so many steps.
@@ -39,7 +43,7 @@ fn dot(a: &[f64], b: &[f64]) -> f64 {
 }
 
 /// The direction of ascent: the gradient times the inverse curvature of the last steps.
-fn direction(gradient: &[f64], past: &VecDeque<Pair>) -> Vec<f64> {
+fn direction(gradient: &[f64], past: &Past) -> Vec<f64> {
     let mut q = gradient.to_vec();
     let mut shares = Vec::with_capacity(past.len());
     for p in past.iter().rev() {
@@ -76,16 +80,15 @@ fn climb(system: &mut System, from: &Point, along: &[f64]) -> TraceResult<Option
     Ok(None)
 }
 
-/// The place that so many steps up from another lead to.
-pub(super) fn ascend(system: &mut System, begun: &Arc<Point>, steps: u32) -> TraceResult<Arc<Point>> {
+/// The place that so many steps up from another lead to; `past` is of the steps before.
+pub(super) fn ascend(system: &mut System, begun: &Arc<Point>, steps: u32, past: &mut Past) -> TraceResult<Arc<Point>> {
     let mut here = Arc::clone(begun);
-    let mut past: VecDeque<Pair> = VecDeque::new();
     for _ in 0..steps {
-        let mut along = direction(&here.gradient, &past);
+        let mut along = direction(&here.gradient, past);
         let slope = dot(&along, &here.gradient);
         if slope.is_nan() || slope <= 0.0 {
             past.clear();
-            along = direction(&here.gradient, &past);
+            along = direction(&here.gradient, past);
         }
         let Some(next) = climb(system, &here, &along)? else {
             if past.is_empty() {
@@ -132,7 +135,7 @@ impl Kernel for Optimize {
         let Some((mut system, begun)) = System::begin(trace, at, &targets, None, &mut self.memory)? else {
             return Ok(Outcome::default());
         };
-        let here = ascend(&mut system, &begun, self.steps)?;
+        let here = ascend(&mut system, &begun, self.steps, &mut Past::new())?;
         let moved = here.log_density > begun.log_density && system.settle(Some(&here))?;
         if !moved {
             trace.rollback();

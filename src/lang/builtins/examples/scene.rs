@@ -72,6 +72,13 @@ let view = scene.render(scene.box(1), camera = above);",
         ),
     ),
     (
+        "scene.people",
+        "\
+data photo = image(\"ball.png\");
+let people = scene.people(photo);
+assume tall ~ normal(if len(people) > 0 { people[0].torso } else { 0 }, 1);",
+    ),
+    (
         "scene.chamfer",
         seen!(
             "data photo = image(\"ball.png\");",

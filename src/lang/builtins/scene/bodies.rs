@@ -46,6 +46,8 @@ pub(super) const TABLE: &[Row] = &[
         &[
             arg("rig", ARMATURE, "The armature."),
             arg("morphs", Type::Record, "How much of each of its morphs is added: 1 is the morph itself."),
+            opt("cloth", Type::Num, "0", "How far outside the skin the surface lies, along its normals at rest; joints stay.")
+                .unit("the mesh's units"),
         ],
         ARMATURE,
         "The armature with its shape at rest changed by linear offsets, such as `{ tall: 0.5 }`.",
@@ -61,7 +63,7 @@ pub(super) const TABLE: &[Row] = &[
                 }
                 list.push((&**name, *x));
             }
-            body.shaped(&list).map(|b| Value::object(ArmatureValue(Arc::new(b)))).map_err(fault)
+            body.clothed(&list, a.num_or(2, 0.0)?).map(|b| Value::object(ArmatureValue(Arc::new(b)))).map_err(fault)
         },
     )
     .pull(body_pulls::shaped),

@@ -79,7 +79,8 @@ pub(super) fn shaped(a: &Args, _: &Value, by: &Adjoint) -> Option<Pulled> {
     let Value::Record(amounts) = a.get(1) else { return None };
     let rest = by_armature(by, body);
     let slope = |k: &Arc<str>| Some((Arc::clone(k), Adjoint::Num(body.pull_morph(k, &rest)?)));
-    Some(smallvec![by.clone(), Adjoint::Record(amounts.keys().map(slope).collect::<Option<_>>()?)])
+    let by_amounts = Adjoint::Record(amounts.keys().map(slope).collect::<Option<_>>()?);
+    Some(smallvec![by.clone(), by_amounts, Adjoint::Num(body.pull_cloth(&rest))])
 }
 
 /// Of `scene.stretched`.

@@ -365,7 +365,7 @@ impl MaskOf {
             return Err(format!("scene.mask: the observed value must be a mask, got {}", observed.type_name()));
         };
         same_shape((mask.mask.width(), mask.mask.height()), &self.view, self.name())?;
-        let frame = self.view.frame(self.size);
+        let frame = self.view.depth(self.size);
         let prepared = mask.prepared.get((self.eps, frame.width, frame.height), |([i, o], w, h)| {
             MaskLikelihood::new(&mask.mask, *i, *o).map(|l| l.resized(*w, *h)).map_err(|e| format!("scene.mask: {e}"))
         })?;

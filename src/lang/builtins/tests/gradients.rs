@@ -14,6 +14,7 @@ const NONE: &[(&str, &str)] = &[
     ("scene.autorig", "joints are found by search"),
     ("scene.camera", "cameras are not differentiated"),
     ("scene.edges", "contours are found in a photograph, which nothing moves"),
+    ("scene.people", "people are found in a photograph, which nothing moves"),
 ];
 
 /// Functions compared with differences elsewhere: in `tests/gradient.rs`, and beside the comparators and renderers.
