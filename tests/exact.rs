@@ -494,6 +494,31 @@ fn optimize_finds_the_mode() {
     assert!((d["b"][0] - (p * v - q * u) / det).abs() < 1e-5, "{}", d["b"][0]);
 }
 
+/// Two modes of different weights: a search finds both, jumps between them keep the posterior, and one that goes by a surrogate
+/// which sees neither keeps it, too.
+#[test]
+fn jumps_between_modes_keep_their_weights() {
+    let density = |x: f64| normal_pdf(x, 0.5, 2.0) * normal_pdf(9.0, x * x, 1.0);
+    let (all, right) = (integrate(density, -9.0, 9.0, 4000), integrate(density, 0.0, 9.0, 4000));
+    for (kernel, accepted) in [
+        ("modes(@x, tries = 40, keep = 8, steps = 20)", 0.6),
+        ("modes(@x, tries = 8, keep = 8, steps = 20, first = @x)", 0.6),
+        ("modes(@x, tries = 40, keep = 8, steps = 20, at = @seen)", 0.05),
+    ] {
+        let text = format!(
+            "assume x ~ normal(0.5, 2); observe normal(x * x, 1) = 9 with coarse = flat() as seen;
+             infer {{ warmup 1 {{ {kernel}; }} repeat 40000 {{ {kernel}; collect x; }} }}"
+        );
+        let x = &run(&text, 1, 2)["x"];
+        let positive: Vec<f64> = x.iter().map(|x| f64::from(u8::from(*x > 0.0))).collect();
+        assert_mean(kernel, &positive, right / all, 0.02);
+        let squares: Vec<f64> = x.iter().map(|x| x * x).collect();
+        assert_mean(kernel, &squares, integrate(|x| x * x * density(x), -9.0, 9.0, 4000) / all, 0.05);
+        let moved = x.windows(2).filter(|w| w[0] != w[1]).count() as f64 / x.len() as f64;
+        assert!(moved > accepted, "{kernel}: {moved} of its proposals are accepted");
+    }
+}
+
 /// Annealed particles estimate the evidence, here known, and their states are draws from the posterior.
 #[test]
 fn particles_give_the_evidence() {

@@ -42,7 +42,7 @@ pub use save::{SaveError, SavedTrace};
 pub use select::{ChoiceKind, Pattern, PatternSegment, Selector};
 
 use crate::dist::{Datum, Dist, Support};
-use crate::lang::code::{Code, DistSpec, Op, Operand};
+use crate::lang::code::{Code, DistSpec, Op};
 pub use crate::lang::error::RunError;
 use crate::lang::value::{Likelihood, Located, Value};
 #[doc(hidden)]

@@ -308,6 +308,7 @@ fn cases() -> Vec<E> {
     ]);
     all.extend([
         Call("scene.shaped", vec![rig(), morphs()]),
+        Call("scene.shaped", vec![rig(), morphs(), By(num(0.03))]),
         reshaped(),
         Call("scene.skin", vec![reshaped(), vector(&turns)]),
         Call("scene.skin", vec![rig(), By(joints)]),
