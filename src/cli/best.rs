@@ -10,10 +10,11 @@ use pcadlang::Model;
 use pcadlang::geom::{Mesh, Solid, glb, obj};
 use pcadlang::infer::{BestSoFar, BestState, ChainResult};
 use pcadlang::lang::builtins::scene::ViewValue;
+use pcadlang::lang::value::Located;
 use pcadlang::render::View;
 use pcadlang::report::pictures::{self, png};
 use pcadlang::report::{RunDir, npy};
-use pcadlang::session::{exported, exported_operand, over, strokes};
+use pcadlang::session::{detected, exported, exported_operand, over, strokes};
 use pcadlang::trace::Trace;
 use pcadlang::vision::Photo;
 use std::sync::Arc;
@@ -51,7 +52,7 @@ pub fn show_best(
     write(dir, "best.trace.json", &saved)?;
     let mut shown = Shown::default();
     if let Some(view) = scene::view(&mut trace, draws, None) {
-        draw(dir, &view, chains, seed, photo, &mut shown)?;
+        draw(dir, &view, &trace.located(), chains, seed, photo, &mut shown)?;
         shown.view = Some(ViewValue(view));
     }
     for x in model.exports() {
@@ -79,6 +80,7 @@ pub fn keep_best(dir: &RunDir, model: &Model, best: &BestSoFar, ending: &Ending,
 fn draw(
     dir: &RunDir,
     view: &Arc<View>,
+    located: &[Located],
     chains: &[ChainResult],
     seed: u64,
     photo: Option<&Photo>,
@@ -98,7 +100,8 @@ fn draw(
         write(dir, "mask.png", &encode(png(&mask))?)?;
     }
     let large = pictures::picture_size(width, height);
-    let over = over(view, photo.map(Photo::rgb), (width, height));
+    let mut over = over(view, photo.map(Photo::rgb), (width, height));
+    detected(&mut over, view, located, (width, height));
     let overlay = encode(png(&over))?;
     let lines = encode(png(&pictures::contours(frame.width, frame.height, &strokes(&view.contours(size)))))?;
     write(dir, "overlay.png", &overlay)?;
@@ -107,7 +110,11 @@ fn draw(
         let resized = image::imageops::resize(p.rgb(), large.0, large.1, image::imageops::FilterType::Triangle);
         shown.pictures.push(("the photograph", encode(png(&resized))?));
     }
-    shown.pictures.push(("the best state over it", overlay));
+    let caption = match located.is_empty() {
+        true => "the best state over it",
+        false => "the best state over it; its own joints yellow, each with a line to where it was detected",
+    };
+    shown.pictures.push((caption, overlay));
     let spread = encode(png(&frequency(chains, seed, 128)))?;
     write(dir, "uncertainty.png", &spread)?;
     shown.pictures.push(("how often the last draws of the chains cover a pixel", spread));

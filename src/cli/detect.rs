@@ -3,7 +3,7 @@
 use super::{Failure, files, plain};
 use clap::Args;
 use image::RgbImage;
-use pcadlang::report::pictures::{dots, limbs, picture_size, png};
+use pcadlang::report::pictures::{DETECTED, dots, limbs, picture_size, png};
 use pcadlang::vision::Photo;
 use pcadlang::vision::people::{FindOptions, PeopleFinder, Person, json, networks};
 use std::borrow::Cow;
@@ -177,7 +177,7 @@ fn overlay(photo: &Photo, people: &[Person]) -> RgbImage {
             let ends: Vec<_> = bones.iter().filter_map(|(a, b)| Some([p.landmark(a)?.at, p.landmark(b)?.at])).collect();
             limbs(&mut out, size, &ends, color);
         }
-        dots(&mut out, size, &p.landmarks.map(|l| l.at));
+        dots(&mut out, size, &p.landmarks.map(|l| l.at), DETECTED);
     }
     out
 }

@@ -9,7 +9,7 @@ use pcadlang::lang::builtins::scene::ImageValue;
 use pcadlang::lang::value::Value;
 use pcadlang::render::Camera;
 use pcadlang::trace::Limits as Bounds;
-use pcadlang::vision::{ContourMap, Photo};
+use pcadlang::vision::ContourMap;
 use std::path::Path;
 
 /// Opens the program, with its parameters and camera.
@@ -40,9 +40,9 @@ pub fn program(given: &Given, quiet: bool) -> Result<Program, Failure> {
     Ok(program)
 }
 
-/// Binds the files of `--observe`, `--keypoints` and `--observe-contours`; gives the photograph among them.
-pub fn observe(mut program: Program, job: &Job) -> Result<(Program, Option<Photo>), Failure> {
-    let mut image: Option<(String, Photo)> = None;
+/// Binds the files of `--observe`, `--keypoints` and `--observe-contours`; gives the name and the value of the photograph among them.
+pub fn observe(mut program: Program, job: &Job) -> Result<(Program, Option<(String, Value)>), Failure> {
+    let mut image: Option<(String, Value)> = None;
     let mut stem: Option<String> = None;
     let mut detected: Vec<(String, String)> = Vec::new();
     for spec in &job.observe {
@@ -50,8 +50,8 @@ pub fn observe(mut program: Program, job: &Job) -> Result<(Program, Option<Photo
         let kind = program.interface().data.iter().find(|d| d.name == name).and_then(|d| d.ty.clone());
         match kind.as_deref() {
             Some("image") => {
-                let photo = files::photo(Path::new(&path))?;
-                program = program.observe(&name, Value::object(ImageValue::photo(photo.clone())));
+                let photo = Value::object(ImageValue::photo(files::photo(Path::new(&path))?));
+                program = program.observe(&name, photo.clone());
                 stem = Path::new(&path).file_stem().and_then(|s| s.to_str()).map(str::to_owned);
                 image = Some((name, photo));
             }
@@ -82,10 +82,12 @@ pub fn observe(mut program: Program, job: &Job) -> Result<(Program, Option<Photo
             Some((name, _)) => name.clone(),
             None => only(&program, "image", "--observe")?,
         };
-        let photo = image.as_ref().map(|(_, p)| p.clone());
-        program = program.observe(&name, Value::object(ImageValue::contours(map, photo)));
+        let photo = image.as_ref().and_then(|(_, i)| i.downcast::<ImageValue>()?.as_photo().cloned());
+        let contours = Value::object(ImageValue::contours(map, photo));
+        program = program.observe(&name, contours.clone());
+        image = image.map(|(name, _)| (name, contours));
     }
-    Ok((program, image.map(|(_, p)| p)))
+    Ok((program, image))
 }
 
 /// The file and entry of `FILE#ID`; a file that is called so is a file.

@@ -6,10 +6,11 @@ use super::args::Job;
 use super::best::{keep_best, show_best};
 use super::keypoints::Joints;
 use super::progress::{self, Ending};
-use super::{Failure, files, given, plain};
+use super::{Failure, files, given, people, plain};
 use pcadlang::bank::BankFiles;
 use pcadlang::infer::draws::{KernelStats, Sink, SiteStats};
 use pcadlang::infer::{BestSoFar, BestState, ChainResult, Progress, Watch, Watches};
+use pcadlang::lang::{self, builtins::scene::ImageValue};
 use pcadlang::report::html::{MeshData, Page, page};
 use pcadlang::report::{
     ChainDraws, ChainFiles, Memory, Mode, Quantity, RunDir, bytes_hash, modes, quantities, seconds, table, text_hash,
@@ -29,7 +30,8 @@ const ROOM: usize = 4 << 20;
 pub struct Ready {
     /// The program with its data.
     pub model: Model,
-    photo: Option<Photo>,
+    /// The photograph: its name, and its value.
+    image: Option<(String, lang::value::Value)>,
     begun: Instant,
 }
 
@@ -60,7 +62,11 @@ pub struct Outcome {
 impl Ready {
     /// Width and height of the photograph, if there is one.
     pub fn size(&self) -> Option<(u32, u32)> {
-        self.photo.as_ref().map(|p| (p.width(), p.height()))
+        self.photo().map(|p| (p.width(), p.height()))
+    }
+
+    fn photo(&self) -> Option<&Photo> {
+        self.image.as_ref()?.1.downcast::<ImageValue>()?.as_photo()
     }
 }
 
@@ -88,8 +94,8 @@ pub fn summaries(quantities: &[Quantity], seconds: f64) -> Map<String, Value> {
 /// Reads and compiles; the time of a run begins here.
 pub fn prepare(job: &Job, quiet: bool) -> Result<Ready, Failure> {
     let begun = Instant::now();
-    let (program, photo) = given::observe(given::program(&job.given, quiet)?, job)?;
-    Ok(Ready { model: program.compile()?, photo, begun })
+    let (program, image) = given::observe(given::program(&job.given, quiet)?, job)?;
+    Ok(Ready { model: program.compile()?, image, begun })
 }
 
 /// Ctrl-C, for all runs there are.
@@ -276,7 +282,7 @@ fn fill(
     interrupt: &Interrupt,
     manner: Manner,
 ) -> Result<Outcome, Failure> {
-    let Ready { model, photo, begun } = ready;
+    let Ready { model, image, begun } = ready;
     let s = &job.sampling;
     let joints = Joints::new(s.chains(), ready.size());
     let progress = Arc::new(Progress::default());
@@ -301,7 +307,9 @@ fn fill(
     let quantities = quantities(&draws);
     let every = draws.iter().map(|d| d.every).max().unwrap_or(1);
     let kernels = table::merged(chains.iter().map(|c| &c.kernels[..]));
-    let warnings = table::warnings(&quantities, &kernels, chains.len());
+    let mut warnings = table::warnings(&quantities, &kernels, chains.len());
+    let person = job.given.who.person.unwrap_or(1);
+    warnings.extend(image.iter().flat_map(|(name, image)| people::warnings(name, image, person)));
     let modes = modes(&quantities);
     let approximate = approximate(job, &chains);
     let sites = SiteStats::total(chains.iter().flat_map(|c| &c.sites));
@@ -311,7 +319,7 @@ fn fill(
     });
     write(dir, "summary.json", &serde_json::to_vec_pretty(&summary).unwrap_or_default())?;
     let best = best.state();
-    let drawn = show_best(dir, s.seed, model, best.as_deref(), &chains, photo.as_ref())?;
+    let drawn = show_best(dir, s.seed, model, best.as_deref(), &chains, ready.photo())?;
     let elapsed = begun.elapsed().as_secs_f64();
     if let Some(found) = drawn.view.as_ref().and_then(|v| joints.report(v, elapsed)) {
         write(dir, "keypoints.json", &serde_json::to_vec_pretty(&found).unwrap_or_default())?;

@@ -17,6 +17,7 @@ mod job;
 mod keypoints;
 mod learn;
 mod manual;
+mod people;
 mod predict;
 mod progress;
 mod quality;

@@ -111,6 +111,8 @@ pub struct Located {
     pub at: [f64; 2],
     /// The variance along an axis, in units of the squared diagonal.
     pub variance: f64,
+    /// Where it was observed, in the same shares; of several places the likeliest.
+    pub observed: [f64; 2],
 }
 
 /// A log-density of an observed value given the scene: it scores; some can draw observations, none can be drawn with `~`.

@@ -23,7 +23,7 @@ mod why;
 pub use command::{COMMANDS, Command};
 pub use complete::Completion;
 pub use export::{exported, exported_operand};
-pub use picture::{Picture, drawn, over, strokes};
+pub use picture::{Picture, detected, drawn, over, strokes};
 pub use reply::{Reply, Trouble};
 pub use run::Status;
 

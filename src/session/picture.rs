@@ -5,6 +5,7 @@ use crate::bank;
 use crate::diag::nearest;
 use crate::lang::builtins::scene::{ImageValue, ViewValue};
 use crate::lang::code::{Code, Operand};
+use crate::lang::value::Located;
 use crate::render::{Contours, Frame, View};
 use crate::report::pictures::{self, Drawn, Strokes};
 use image::RgbImage;
@@ -43,8 +44,20 @@ pub fn over(view: &Arc<View>, photo: Option<&RgbImage>, (width, height): (u32, u
     let mut out = pictures::overlay(photo, &drawn(&picture), &strokes(&contours));
     let marked = ViewValue(Arc::clone(view));
     let points: Vec<[f64; 2]> = marked.landmarks(width, height).filter_map(|(_, at)| at).collect();
-    pictures::dots(&mut out, (width, height), &points);
+    pictures::dots(&mut out, (width, height), &points, pictures::OF_SCENE);
     out
+}
+
+/// Draws where points of the scene were observed, each with a line to where the scene has it.
+pub fn detected(out: &mut RgbImage, view: &Arc<View>, located: &[Located], (width, height): (u32, u32)) {
+    let scale = |[x, y]: [f64; 2]| [x * f64::from(width), y * f64::from(height)];
+    let seen: Vec<[f64; 2]> = located.iter().map(|l| scale(l.observed)).collect();
+    let marked = ViewValue(Arc::clone(view));
+    let own: Vec<_> = marked.landmarks(width, height).collect();
+    let at = |name: &str| own.iter().find(|(n, _)| &***n == name).and_then(|(_, at)| *at);
+    let lines: Vec<_> = located.iter().zip(&seen).filter_map(|(l, seen)| Some([at(&l.name)?, *seen])).collect();
+    pictures::limbs(out, (width, height), &lines, pictures::DETECTED);
+    pictures::dots(out, (width, height), &seen, pictures::DETECTED);
 }
 
 /// A frame as the reports want it.

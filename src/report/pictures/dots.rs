@@ -3,13 +3,16 @@
 use super::{LONGER_SIDE, mix};
 use image::RgbImage;
 
-/// The colour of a dot, and of the ring around it that sets it off from what is below.
-const DOT: [f32; 3] = [255.0, 220.0, 0.0];
+/// The colour of points of the scene.
+pub const OF_SCENE: [f32; 3] = [255.0, 220.0, 0.0];
+/// The colour of points that a detector found.
+pub const DETECTED: [f32; 3] = [90.0, 220.0, 255.0];
+/// The colour of the ring around a dot that sets it off from what is below.
 const RING: [f32; 3] = [20.0, 20.0, 20.0];
 
 /// Draws dots, about 9 pixels wide in a picture of [`LONGER_SIDE`]. Positions are in pixels of a picture of `width` x
 /// `height` and scaled to this one; what is not finite is left out.
-pub fn dots(out: &mut RgbImage, (width, height): (u32, u32), at: &[[f64; 2]]) {
+pub fn dots(out: &mut RgbImage, (width, height): (u32, u32), at: &[[f64; 2]], color: [f32; 3]) {
     let (w, h) = (out.width() as f32, out.height() as f32);
     let (sx, sy) = (w / width.max(1) as f32, h / height.max(1) as f32);
     let radius = (4.5 * w.max(h) / LONGER_SIDE as f32).max(2.0);
@@ -26,7 +29,7 @@ pub fn dots(out: &mut RgbImage, (width, height): (u32, u32), at: &[[f64; 2]]) {
                 let (px, py) = (u as f32 + 0.5 - x, v as f32 + 0.5 - y);
                 let inside = |r: f32| (r + 0.5 - (px * px + py * py).sqrt()).clamp(0.0, 1.0);
                 let Some(p) = out.get_pixel_mut_checked(u, v) else { continue };
-                p.0 = mix(mix(p.0, RING, inside(radius)), DOT, inside(0.65 * radius));
+                p.0 = mix(mix(p.0, RING, inside(radius)), color, inside(0.65 * radius));
             }
         }
     }
@@ -39,11 +42,11 @@ mod tests {
     #[test]
     fn a_dot_is_where_it_should_be_and_nowhere_else() {
         let mut p = RgbImage::new(200, 100);
-        dots(&mut p, (20, 10), &[[10.0, 5.0], [f64::NAN, 1.0], [1e300, 1.0], [-50.0, 5.0]]);
+        dots(&mut p, (20, 10), &[[10.0, 5.0], [f64::NAN, 1.0], [1e300, 1.0], [-50.0, 5.0]], OF_SCENE);
         assert_eq!(p.get_pixel(100, 50).0, [255, 220, 0]);
         let lit: Vec<(u32, u32)> =
             p.enumerate_pixels().filter(|(.., c)| c.0 != [0; 3]).map(|(x, y, _)| (x, y)).collect();
         assert!(lit.len() > 8 && lit.iter().all(|(x, y)| x.abs_diff(100) < 5 && y.abs_diff(50) < 5), "{lit:?}");
-        dots(&mut RgbImage::new(0, 0), (0, 0), &[[0.0, 0.0]]);
+        dots(&mut RgbImage::new(0, 0), (0, 0), &[[0.0, 0.0]], OF_SCENE);
     }
 }

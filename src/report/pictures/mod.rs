@@ -10,7 +10,7 @@ mod sheet;
 mod strokes;
 mod surface;
 
-pub use dots::dots;
+pub use dots::{DETECTED, OF_SCENE, dots};
 pub use limbs::limbs;
 pub use sheet::{captioned_sheet, contact_sheet};
 pub use strokes::{Strokes, contours};

@@ -205,6 +205,13 @@ impl KeypointLikelihood {
         ([0, 1].map(|i| joint[i] + shift[i]), within + apart.max(0.0))
     }
 
+    /// The place of a detection that is the likeliest to be meant.
+    pub fn meant(&self, seen: &Detection, joint: [f64; 2]) -> [f64; 2] {
+        let (shares, _) = self.shares(seen, joint);
+        let all = seen.places.iter().zip(shares).map(|((at, _), [well, miss])| (*at, well + miss));
+        all.reduce(|a, b| if b.1 > a.1 { b } else { a }).map_or(joint, |(at, _)| at)
+    }
+
     /// Places drawn, as many as a detection has.
     pub fn sample(&self, seen: &Detection, joint: Option<[f64; 2]>, rng: &mut Stream) -> SmallVec<[[f64; 2]; 3]> {
         let mut meant = None;

@@ -146,11 +146,13 @@ impl Likelihood for KeypointsOf {
         let add = |term: Term| {
             let Some(joint) = term.joint else { return };
             let (at, variance) = term.model.located(&term.seen, joint);
+            let seen = term.model.meant(&term.seen, joint);
             let (width, height) = term.size;
             all.push(Located {
                 name: Arc::clone(&landmarks[term.landmark].name),
                 at: [at[0] / width, at[1] / height],
                 variance: variance / (width * width + height * height),
+                observed: [seen[0] / width, seen[1] / height],
             });
         };
         // What cannot be compared has failed before.

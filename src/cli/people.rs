@@ -1,0 +1,47 @@
+//! What a run says of the people in its photograph, where the program looked for some.
+
+use pcadlang::lang::builtins::scene::ImageValue;
+use pcadlang::lang::value::Value;
+use pcadlang::vision::people::Person;
+
+/// The joints of a body; landmarks of faces and hands would outnumber them.
+const BODY: [&str; 12] = [
+    "l_shoulder", "r_shoulder", "l_elbow", "r_elbow", "l_wrist", "r_wrist", "l_hip", "r_hip", "l_knee", "r_knee", "l_ankle", "r_ankle",
+];
+
+/// That nobody was found, that others may be meant, that little of a body is in the picture. `person` counts from 1.
+pub fn warnings(name: &str, image: &Value, person: u32) -> Vec<String> {
+    let image = image.downcast::<ImageValue>();
+    let Some((image, people)) = image.and_then(|i| Some((i, i.people()?))) else { return Vec::new() };
+    if people.is_empty() {
+        return vec![format!(
+            "nobody was found in `{name}`: the program has only the rest of the picture to go by, which seldom finds a body \
+             (another detector's joints: --keypoints FILE)"
+        )];
+    }
+    let Some(chosen) = people.get((person as usize).saturating_sub(1)) else {
+        return vec![format!("only {} people were found in `{name}`: there is no person {person}", people.len())];
+    };
+    let mut all = Vec::new();
+    if people.len() > 1 {
+        all.push(format!(
+            "several people were found in `{name}`, of whom person {person} is meant; others with --person N or --box X,Y,W,H \
+             (`pcadlang detect` lists them)"
+        ));
+    }
+    let inside = inside(chosen, image.size());
+    if 2 * inside < BODY.len() {
+        all.push(format!(
+            "most of the body is outside the picture: {inside} of {} shoulders, elbows, wrists, hips, knees and ankles are inside; \
+             of the others only the prior tells",
+            BODY.len()
+        ));
+    }
+    all
+}
+
+/// How many of the body's joints are inside a picture of this size.
+fn inside(p: &Person, (width, height): (u32, u32)) -> usize {
+    let within = |at: [f64; 2]| (0.0..f64::from(width)).contains(&at[0]) && (0.0..f64::from(height)).contains(&at[1]);
+    BODY.iter().filter(|name| p.landmark(name).is_some_and(|l| within(l.at))).count()
+}
