@@ -86,7 +86,8 @@ pub struct Who {
 
 /// `X,Y,W,H`.
 fn rectangle(text: &str) -> Result<[f64; 4], String> {
-    let numbers: Vec<f64> = text.split(',').filter_map(|x| x.trim().parse().ok()).filter(|x: &f64| x.is_finite()).collect();
+    let numbers: Vec<f64> =
+        text.split(',').filter_map(|x| x.trim().parse().ok()).filter(|x: &f64| x.is_finite()).collect();
     match numbers[..] {
         [x, y, w, h] if text.split(',').count() == 4 && w > 0.0 && h > 0.0 => Ok([x, y, w, h]),
         _ => Err("four numbers X,Y,W,H with a positive width and height were expected".into()),

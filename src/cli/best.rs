@@ -101,7 +101,7 @@ fn draw(
     }
     let large = pictures::picture_size(width, height);
     let mut over = over(view, photo.map(Photo::rgb), (width, height));
-    detected(&mut over, view, located, (width, height));
+    detected(&mut over, located, (width, height));
     let overlay = encode(png(&over))?;
     let lines = encode(png(&pictures::contours(frame.width, frame.height, &strokes(&view.contours(size)))))?;
     write(dir, "overlay.png", &overlay)?;

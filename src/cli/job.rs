@@ -32,6 +32,8 @@ pub struct Ready {
     pub model: Model,
     /// The photograph: its name, and its value.
     image: Option<(String, lang::value::Value)>,
+    /// Whether the program is about one of the people in it.
+    chooses: bool,
     begun: Instant,
 }
 
@@ -95,7 +97,8 @@ pub fn summaries(quantities: &[Quantity], seconds: f64) -> Map<String, Value> {
 pub fn prepare(job: &Job, quiet: bool) -> Result<Ready, Failure> {
     let begun = Instant::now();
     let (program, image) = given::observe(given::program(&job.given, quiet)?, job)?;
-    Ok(Ready { model: program.compile()?, image, begun })
+    let chooses = program.interface().params.iter().any(|p| p.name == "person");
+    Ok(Ready { model: program.compile()?, image, chooses, begun })
 }
 
 /// Ctrl-C, for all runs there are.
@@ -282,7 +285,7 @@ fn fill(
     interrupt: &Interrupt,
     manner: Manner,
 ) -> Result<Outcome, Failure> {
-    let Ready { model, image, begun } = ready;
+    let Ready { model, image, begun, chooses } = ready;
     let s = &job.sampling;
     let joints = Joints::new(s.chains(), ready.size());
     let progress = Arc::new(Progress::default());
@@ -309,7 +312,9 @@ fn fill(
     let kernels = table::merged(chains.iter().map(|c| &c.kernels[..]));
     let mut warnings = table::warnings(&quantities, &kernels, chains.len());
     let person = job.given.who.person.unwrap_or(1);
-    warnings.extend(image.iter().flat_map(|(name, image)| people::warnings(name, image, person)));
+    if *chooses {
+        warnings.extend(image.iter().flat_map(|(name, image)| people::warnings(name, image, person)));
+    }
     let modes = modes(&quantities);
     let approximate = approximate(job, &chains);
     let sites = SiteStats::total(chains.iter().flat_map(|c| &c.sites));

@@ -4,6 +4,7 @@ use super::scene::view_operand;
 use pcadlang::infer::{StateError, Watch};
 use pcadlang::lang::builtins::scene::ViewValue;
 use pcadlang::lang::code::Operand;
+use pcadlang::lang::value::Located;
 use pcadlang::report::Moments;
 use pcadlang::trace::{Draws, Trace};
 use serde::{Deserialize, Serialize};
@@ -81,9 +82,8 @@ impl Joints {
         }
         let numbers = |xs: &mut dyn Iterator<Item = f64>| xs.map(rounded).collect::<Value>();
         let spread = |m: &Moments| -> Map<String, Value> {
-            let each = m.iter().map(|(name, p)| {
-                (name.to_owned(), numbers(&mut p.mean.iter().copied().chain([p.sd()])))
-            });
+            let each =
+                m.iter().map(|(name, p)| (name.to_owned(), numbers(&mut p.mean.iter().copied().chain([p.sd()]))));
             each.collect()
         };
         let Seen { joints, own, scene } = self.all();
@@ -130,7 +130,12 @@ impl Watch for Joints {
             if let Some(at) = at {
                 seen.own.add(&name, &at, 0.0);
             }
-            match (found.iter().find(|l| l.name == name), at) {
+            // Of several solids' landmarks of one name the second is called NAME#2, but observed by its name.
+            let same = |l: &&Located| {
+                let near = |k: usize, size: f64| at.is_some_and(|at| (l.own[k] * size - at[k]).abs() < 1e-6 * size);
+                name.split('#').next() == Some(&*l.name) && near(0, width) && near(1, height)
+            };
+            match (found.iter().find(same), at) {
                 (Some(l), _) => {
                     let diagonal = width * width + height * height;
                     seen.joints.add(&name, &[l.at[0] * width, l.at[1] * height], l.variance * diagonal);

@@ -6,7 +6,18 @@ use pcadlang::vision::people::Person;
 
 /// The joints of a body; landmarks of faces and hands would outnumber them.
 const BODY: [&str; 12] = [
-    "l_shoulder", "r_shoulder", "l_elbow", "r_elbow", "l_wrist", "r_wrist", "l_hip", "r_hip", "l_knee", "r_knee", "l_ankle", "r_ankle",
+    "l_shoulder",
+    "r_shoulder",
+    "l_elbow",
+    "r_elbow",
+    "l_wrist",
+    "r_wrist",
+    "l_hip",
+    "r_hip",
+    "l_knee",
+    "r_knee",
+    "l_ankle",
+    "r_ankle",
 ];
 
 /// That nobody was found, that others may be meant, that little of a body is in the picture. `person` counts from 1.

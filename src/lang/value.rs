@@ -113,6 +113,8 @@ pub struct Located {
     pub variance: f64,
     /// Where it was observed, in the same shares; of several places the likeliest.
     pub observed: [f64; 2],
+    /// Where the scene has it, in the same shares.
+    pub own: [f64; 2],
 }
 
 /// A log-density of an observed value given the scene: it scores; some can draw observations, none can be drawn with `~`.

@@ -48,14 +48,11 @@ pub fn over(view: &Arc<View>, photo: Option<&RgbImage>, (width, height): (u32, u
     out
 }
 
-/// Draws where points of the scene were observed, each with a line to where the scene has it.
-pub fn detected(out: &mut RgbImage, view: &Arc<View>, located: &[Located], (width, height): (u32, u32)) {
+/// Draws where points of the scene were observed, each with a line to where the scene has it, over a picture of `width` x `height`.
+pub fn detected(out: &mut RgbImage, located: &[Located], (width, height): (u32, u32)) {
     let scale = |[x, y]: [f64; 2]| [x * f64::from(width), y * f64::from(height)];
-    let seen: Vec<[f64; 2]> = located.iter().map(|l| scale(l.observed)).collect();
-    let marked = ViewValue(Arc::clone(view));
-    let own: Vec<_> = marked.landmarks(width, height).collect();
-    let at = |name: &str| own.iter().find(|(n, _)| &***n == name).and_then(|(_, at)| *at);
-    let lines: Vec<_> = located.iter().zip(&seen).filter_map(|(l, seen)| Some([at(&l.name)?, *seen])).collect();
+    let lines: Vec<_> = located.iter().map(|l| [scale(l.own), scale(l.observed)]).collect();
+    let seen: Vec<_> = lines.iter().map(|[_, seen]| *seen).collect();
     pictures::limbs(out, (width, height), &lines, pictures::DETECTED);
     pictures::dots(out, (width, height), &seen, pictures::DETECTED);
 }

@@ -232,7 +232,8 @@ fn depths_masks_and_keypoints_score_anything() {
         points.check(DepthLikelihood::new(&observed, 1.0, bad, (0.0, 1e38)).is_err(), || format!("outliers {bad}"));
     }
     for sd in [1e-300, 1e-6, 1.0, 1e6, 1e8] {
-        let l = KeypointLikelihood::new(640.0, 480.0, 0.0, &KeypointOptions { sd, ..KeypointOptions::default() }).unwrap();
+        let l =
+            KeypointLikelihood::new(640.0, 480.0, 0.0, &KeypointOptions { sd, ..KeypointOptions::default() }).unwrap();
         for c in [0.0, 1e-300, 320.0, -1e150, 1e300, f64::MAX, f64::INFINITY, f64::NAN] {
             for confidence in [0.0, 1e-300, 1.0, 7.0, f64::NAN] {
                 let seen = Detection::new([320.0, 240.0], confidence).or([([1e9, -1e300], 1e-300)].into_iter());

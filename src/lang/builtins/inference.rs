@@ -184,8 +184,18 @@ pub(super) const TABLE: &[Row] = &[
             opt("tries", Type::Int, "200", "Draws from the prior among which starts are looked for."),
             opt("keep", Type::Int, "16", "How many of them, the likeliest, climb to a mode."),
             opt("steps", Type::Int, "60", "The most steps of a climb."),
-            opt("first", Type::Selection, "none", "Choices that climb alone in each draw, some steps, before draws are compared."),
-            opt("at", Type::Selection, "none", "Observations in whose place their coarse surrogates stand while modes are looked for."),
+            opt(
+                "first",
+                Type::Selection,
+                "none",
+                "Choices that climb alone in each draw, some steps, before draws are compared.",
+            ),
+            opt(
+                "at",
+                Type::Selection,
+                "none",
+                "Observations in whose place their coarse surrogates stand while modes are looked for.",
+            ),
         ],
         Type::Kernel,
         "Jumps between modes. Its first step looks for them: the likeliest of some draws of the selected choices climb by L-BFGS, of \

@@ -67,9 +67,8 @@ fn chi_squares(
                 seen.push((k, Detection::new(z[0], confidence).or(others(&z[1..]).into_iter())));
             }
         }
-        let log = |i: usize, j: usize| -> f64 {
-            seen.iter().map(|(k, z)| to.log_density(z, Some(joint(*k, i, j)))).sum()
-        };
+        let log =
+            |i: usize, j: usize| -> f64 { seen.iter().map(|(k, z)| to.log_density(z, Some(joint(*k, i, j)))).sum() };
         let mut posterior = vec![0.0; SHIFTS * SCALES];
         let mut most = f64::NEG_INFINITY;
         for (at, w) in posterior.iter_mut().enumerate() {

@@ -332,7 +332,8 @@ mod tests {
         assert!((m.sd() - 5.0).abs() < 1e-12, "both spreads: 3 and 4 pixels");
         let (seen, joint) = ([103.0, 96.0], [100.0, 100.0]);
         // By quadrature over where the joint is: N(q; joint, 4) times the density of the detection about q.
-        let own = KeypointLikelihood::new(400.0, 300.0, 0.0, &KeypointOptions { offset: 0.0, ..options.clone() }).unwrap();
+        let own =
+            KeypointLikelihood::new(400.0, 300.0, 0.0, &KeypointOptions { offset: 0.0, ..options.clone() }).unwrap();
         for confidence in [1.0, 0.3, 0.0] {
             let (mut mass, mut mean, mut square) = (0.0, [0.0; 2], 0.0);
             for i in -80..=80 {
@@ -354,7 +355,11 @@ mod tests {
             assert!((found - variance).abs() < 1e-2, "{found} {variance}");
         }
         let exact = model(1.0, 0.05);
-        assert_eq!(exact.located(&one(seen, 1.0), joint), (joint, 0.0), "without an offset the model's joint is the joint");
+        assert_eq!(
+            exact.located(&one(seen, 1.0), joint),
+            (joint, 0.0),
+            "without an offset the model's joint is the joint"
+        );
     }
 
     #[test]
@@ -381,9 +386,7 @@ mod tests {
 
     #[test]
     fn options_are_checked() {
-        let of = |w: f64, sd: f64, outlier: f64| {
-            KeypointLikelihood::new(w, 10.0, 0.0, &options(sd, outlier))
-        };
+        let of = |w: f64, sd: f64, outlier: f64| KeypointLikelihood::new(w, 10.0, 0.0, &options(sd, outlier));
         assert!(of(10.0, 1.0, 0.1).is_ok());
         for (w, sd, outlier) in [
             (0.0, 1.0, 0.1),

@@ -238,7 +238,8 @@ impl Modes {
             trace.restore(&state, at.draws(0))?;
             let (targets, _) = self.scope.members(trace, at, &mut at.stream());
             let Some(here) = Here::of(trace, &targets) else { continue };
-            let known = |m: &Mode| m.discrete == here.discrete && m.about.distance(&here.y) < 0.25 * here.y.len() as f64;
+            let known =
+                |m: &Mode| m.discrete == here.discrete && m.about.distance(&here.y) < 0.25 * here.y.len() as f64;
             if *signature.get_or_insert_with(|| here.signature.clone()) != here.signature || modes.iter().any(known) {
                 continue;
             }

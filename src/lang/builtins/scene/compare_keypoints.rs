@@ -85,7 +85,9 @@ fn spreads(a: &Args) -> Result<(f64, Vec<(Arc<str>, f64)>), Fault> {
         v => Err(a.element_wrong(1, "a positive number, or a record of them with `other`", v)),
     };
     let Some(other) = record.get("other") else {
-        return Err(Fault::type_error("scene.keypoints: the record `sd` needs a field `other` for the rest of the joints"));
+        return Err(Fault::type_error(
+            "scene.keypoints: the record `sd` needs a field `other` for the rest of the joints",
+        ));
     };
     let named = record.iter().filter(|(name, _)| &***name != "other");
     let named = named.map(|(name, v)| Ok((Arc::clone(name), positive(v)?))).collect::<Result<_, Fault>>()?;
@@ -134,9 +136,10 @@ impl Likelihood for KeypointsOf {
         });
         // In the same unit, wherever the shoulders and hips were drawn.
         let moved = || seen.moved(&points);
-        Some(drawn.map(|()| {
-            Value::object(KeypointsValue(if torso > 0.0 { moved().with_torso(torso) } else { moved() }))
-        }))
+        Some(
+            drawn
+                .map(|()| Value::object(KeypointsValue(if torso > 0.0 { moved().with_torso(torso) } else { moved() }))),
+        )
     }
 
     /// The landmarks that were detected, between where the scene has them and where they were seen.
@@ -153,6 +156,7 @@ impl Likelihood for KeypointsOf {
                 at: [at[0] / width, at[1] / height],
                 variance: variance / (width * width + height * height),
                 observed: [seen[0] / width, seen[1] / height],
+                own: [joint[0] / width, joint[1] / height],
             });
         };
         // What cannot be compared has failed before.

@@ -2,11 +2,11 @@
 //! once, on first use, and kept beside them.
 
 use crate::lang::value::{Object, Value};
+use crate::vision::people::Person;
 use crate::vision::{
     Chamfer, ChamferOptions, ContourDetector, ContourMap, ContourRatio, ContourRatioOptions, DepthLikelihood, DepthMap,
     GradientDetector, Keypoints, Mask, MaskLikelihood, Photo, Region, RegionOptions,
 };
-use crate::vision::people::Person;
 use std::any::Any;
 use std::sync::{Arc, Mutex, OnceLock, PoisonError};
 

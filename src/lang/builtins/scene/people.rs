@@ -20,9 +20,15 @@ pub(super) const TABLE: &[Row] = &[native(
     "Finding",
     &[
         arg("photo", IMAGE, "The photograph; nobody is found in contours alone."),
-        opt("views", Type::Int, "2", "How often it is looked at, 2 to 8: with more and more padding, each time mirrored too."),
+        opt(
+            "views",
+            Type::Int,
+            "2",
+            "How often it is looked at, 2 to 8: with more and more padding, each time mirrored too.",
+        ),
         opt("most", Type::Int, "2", "How many people a view is searched for at most, 1 to 100."),
-        opt("near", Type::Array, "[]", "A box [x, y, width, height]: those who fill it best come first.").unit("pixels"),
+        opt("near", Type::Array, "[]", "A box [x, y, width, height]: those who fill it best come first.")
+            .unit("pixels"),
     ],
     Type::Array,
     "The people in a photograph, the most prominent first. Each is a record: `keypoints`, 33 joints with other places where views \
