@@ -160,10 +160,11 @@ fn line(number: usize, p: &Person, (width, height): (u32, u32)) -> String {
     };
     format!(
         "{number}: {left} to {right} across, {top} to {bottom} down; {seen} of {} landmarks in the picture; {} of {} views \
-         agree{others}",
+         agree{others}; {:.0} % sure",
         p.landmarks.len(),
         p.agreeing,
-        p.views
+        p.views,
+        100.0 * p.sure
     )
 }
 

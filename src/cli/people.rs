@@ -20,6 +20,9 @@ const BODY: [&str; 12] = [
     "r_ankle",
 ];
 
+/// Networks are less sure than this of most things that are no people, and of few people (docs/detector.md).
+const DOUBTFUL: f64 = 0.5;
+
 /// That nobody was found, that others may be meant, that little of a body is in the picture. `person` counts from 1.
 pub fn warnings(name: &str, image: &Value, person: u32) -> Vec<String> {
     let image = image.downcast::<ImageValue>();
@@ -34,6 +37,12 @@ pub fn warnings(name: &str, image: &Value, person: u32) -> Vec<String> {
         return vec![format!("only {} people were found in `{name}`: there is no person {person}", people.len())];
     };
     let mut all = Vec::new();
+    if chosen.sure < DOUBTFUL {
+        all.push(format!(
+            "it is doubtful that `{name}` shows a person: the networks are {:.0} % sure (look at the overlay, or at `pcadlang detect`)",
+            100.0 * chosen.sure
+        ));
+    }
     if people.len() > 1 {
         all.push(format!(
             "several people were found in `{name}`, of whom person {person} is meant; others with --person N or --box X,Y,W,H \

@@ -71,6 +71,8 @@ pub struct Hypothesis {
 pub struct Person {
     /// How much the picture is about them: how often and surely they are seen, how large, how near the middle.
     pub score: f64,
+    /// How sure it is that this is a person, 0 to 1: what both networks grant, in the view where that is most.
+    pub sure: f64,
     /// Left, top, right and bottom of all landmarks, in pixels.
     pub bounds: [f64; 4],
     /// The length of the torso in pixels.
@@ -169,6 +171,7 @@ fn person(score: f64, runs: &[Run], scale: f64) -> Option<Person> {
     };
     Some(Person {
         score,
+        sure: runs.iter().map(|r| r.score.min(r.view.presence)).fold(0.0, f64::max),
         bounds: [least(0), least(1), most(0), most(1)],
         torso: c.torso * scale,
         views: runs.len(),

@@ -33,7 +33,7 @@ pub(super) const TABLE: &[Row] = &[native(
     Type::Array,
     "The people in a photograph, the most prominent first. Each is a record: `keypoints`, 33 joints with other places where views \
      disagree; `landmarks`, by name `at`, `spread` over agreeing views and `visibility`; `metres`, by name [right, down, away] from the \
-     middle of the hips; `mask`; `box`, [x, y, width, height] round all joints, and `torso`, in pixels; `score`; `views` that saw them, \
+     middle of the hips; `mask`; `box`, [x, y, width, height] round all joints, and `torso`, in pixels; `score`; how `sure`, 0 to 1, it is that this is a person; `views` that saw them, \
      and how many are `agreeing`. A function of the picture alone, found once.",
     |a| {
         let image = a.object::<ImageValue>(0, "an image")?;
@@ -105,6 +105,7 @@ fn value(p: &Person, photo: &Photo) -> Result<Value, String> {
         ("box", Value::array(vec![left, top, right - left, bottom - top])),
         ("torso", number(p.torso)),
         ("score", number(p.score)),
+        ("sure", number(p.sure)),
         ("views", number(p.views as f64)),
         ("agreeing", number(p.agreeing as f64)),
     ]))
