@@ -1,6 +1,7 @@
 //! The command line.
 
 use super::detect::Detect;
+use super::people::Who;
 use clap::builder::{PossibleValuesParser, TypedValueParser};
 use clap::{Args, Parser, Subcommand, ValueHint};
 use pcadlang::tradeoff::Quality;
@@ -67,31 +68,6 @@ pub struct Given {
     /// What it may read and build
     #[command(flatten)]
     pub allowed: Allowed,
-}
-
-/// Which person of a photograph is meant, and what finds people.
-#[derive(Args, Clone, Debug, Default)]
-pub struct Who {
-    /// Which of the people in the photograph, the most prominent being 1: sets the program's `person`
-    #[arg(long, value_name = "N", value_parser = clap::value_parser!(u32).range(1..))]
-    pub person: Option<u32>,
-    /// A box in pixels of the photograph: the person who fills it best. Sets the program's `near`
-    #[arg(long = "box", value_name = "X,Y,W,H", value_parser = rectangle)]
-    pub near: Option<[f64; 4]>,
-    /// A folder with networks that find people in place of the program's own: pose_detection.tflite,
-    /// pose_landmark_heavy.tflite, …_full or …_lite
-    #[arg(long, value_name = "DIR")]
-    pub models: Option<PathBuf>,
-}
-
-/// `X,Y,W,H`.
-fn rectangle(text: &str) -> Result<[f64; 4], String> {
-    let numbers: Vec<f64> =
-        text.split(',').filter_map(|x| x.trim().parse().ok()).filter(|x: &f64| x.is_finite()).collect();
-    match numbers[..] {
-        [x, y, w, h] if text.split(',').count() == 4 && w > 0.0 && h > 0.0 => Ok([x, y, w, h]),
-        _ => Err("four numbers X,Y,W,H with a positive width and height were expected".into()),
-    }
 }
 
 /// What a program may read and build.

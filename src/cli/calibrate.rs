@@ -1,8 +1,9 @@
 //! `pcadlang check --sbc` and `--geweke`: whether a program's plan draws from its posterior. The statistics are the library's
 //! ([`pcadlang::infer::calibration`]); here is what is run, and what is said of it.
 
-use super::args::{Check, Given, Job, Sampling, Who};
+use super::args::{Check, Given, Job, Sampling};
 use super::job::{Interrupt, machine_threads};
+use super::people::Who;
 use super::progress::{self, Ending};
 use super::{Failure, given, plain};
 use pcadlang::infer::calibration::{
