@@ -140,7 +140,7 @@ fn crp_at_length() {
 fn scene(data: &str, observe: &str, given: Value) -> Model {
     let text = format!(
         "include \"std/scene.pcad\" as scene; {data};
-         fn ball(r) {{ scene.landmarks(scene.sphere(r, sides = 8), {{ nose: [0, r, 0], l_ankle: [0, -r, 0] }}) }}
+         fn ball(r) {{ scene.landmarks(scene.sphere(r, sides = 8), {{ nose: [0, r, 0], l_ankle: [0, -r, 0], l_hip: [0, 0, -r], r_hip: [0, 0, 0] }}) }}
          assume x ~ normal(0, 0.4); assume y ~ normal(0, 0.4); assume r ~ uniform(0.4, 0.9);
          let view = scene.render(scene.affine(translate = [x, y, 0]) * ball(r));
          observe {observe};
@@ -162,7 +162,11 @@ fn scenes() -> Vec<(&'static str, Model)> {
     let photo = Photo::from_rgb(image::RgbImage::from_fn(16, 16, grey)).unwrap();
     let photo = Value::object(ImageValue::photo(photo));
     let region = "scene.region(view, power = 1, tile_power = 0, colours = 4, size = 16) = seen";
+    let away = |z: f64| Value::array(vec![0.0, 0.0, z]);
+    let metres = Value::record([("nose", away(0.1)), ("l_hip", away(0.4)), ("knee", away(0.0))]);
+    let depths = "scene.relative_depth(view, 1.5, share = 0.8, sd = 0.3, outlier = 0.3) = seen";
     vec![
+        ("relative depth", scene("data seen = json()", depths, metres)),
         ("keypoints", scene("data seen = keypoints()", "scene.keypoints(view, sd = 10, outlier = 0.3) = seen", points)),
         ("region", scene("data seen: image", region, photo)),
         ("mask", scene("data seen = mask()", "scene.mask(view, eps_in = 0.3, eps_out = 0.3, size = 16) = seen", mask)),

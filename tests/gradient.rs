@@ -364,7 +364,9 @@ fn bodies_with_detected_joints() {
         assume turn ~ iid(normal(0, 0.4), 3);
         let place = scene.affine(translate = [x, 0.1, 0], rotate = turn, scale = s) * scene.affine(translate = [0, -0.9, 0]);
         let view = scene.render(place * scene.skin(person, pose));
-        observe scene.keypoints(view, sd = 4, outlier = 0.1) = points as joints;"#;
+        observe scene.keypoints(view, sd = 4, outlier = 0.1) = points as joints;
+        observe scene.relative_depth(view, s, share = 0.7, sd = 0.2, outlier = 0.2)
+          = { nose: [0, 0, -0.2], l_wrist: [0.1, 0.4, 0.3], l_knee: [0, 0, -0.3], r_hip: [0, 0, 0.1] } as depths;"#;
     let model =
         Program::parse(text).unwrap().observe_file("points", file.to_str().unwrap()).unwrap().compile().unwrap();
     for seed in 0..3 {

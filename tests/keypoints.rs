@@ -162,7 +162,12 @@ fn a_run_leaves_where_the_joints_are() {
         |dir: &str| -> serde_json::Value { serde_json::from_str(&f.read(&format!("{dir}/keypoints.json"))).unwrap() };
     let number = |v: &serde_json::Value| v.as_f64().unwrap();
     let (a, b, c) = (json("a"), json("b"), json("c"));
-    assert_eq!(a.as_object().unwrap().keys().collect::<Vec<_>>(), ["keypoints", "best", "seconds"]);
+    assert_eq!(a.as_object().unwrap().keys().collect::<Vec<_>>(), ["keypoints", "body", "scene", "best", "seconds"]);
+    // Without an offset the joints are the scene's own; the camera shows 4.4 units over 440 pixels.
+    assert_eq!(a["keypoints"], a["body"]);
+    let (own, scene) = (&a["body"]["nose"], &a["scene"]["nose"]);
+    assert!((number(&own[0]) - 220.0 - 100.0 * number(&scene[0])).abs() < 0.5, "{own} {scene}");
+    assert!((110.0 - number(&own[1]) - 100.0 * number(&scene[1])).abs() < 0.5, "{own} {scene}");
     for of in [&a, &b] {
         let nose = &of["keypoints"]["nose"];
         assert!((number(&nose[0]) - 266.0).abs() < 6.0 && (number(&nose[1]) - 38.0).abs() < 6.0, "{nose}");

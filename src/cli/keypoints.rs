@@ -127,17 +127,18 @@ impl Watch for Joints {
         let seen = &mut chain.seen;
         for (landmark, (name, at)) in view.0.solid().landmarks().iter().zip(self.positions(view)) {
             seen.scene.add(&name, &landmark.position.to_array(), 0.0);
-            if let Some(at) = at {
-                seen.own.add(&name, &at, 0.0);
-            }
             // Of several solids' landmarks of one name the second is called NAME#2, but observed by its name.
             let same = |l: &&Located| {
                 let near = |k: usize, size: f64| at.is_some_and(|at| (l.own[k] * size - at[k]).abs() < 1e-6 * size);
                 name.split('#').next() == Some(&*l.name) && near(0, width) && near(1, height)
             };
-            match (found.iter().find(same), at) {
+            let located = found.iter().find(same);
+            let diagonal = width * width + height * height;
+            if let Some(at) = at {
+                seen.own.add(&name, &at, located.map_or(0.0, |l| l.own_variance * diagonal));
+            }
+            match (located, at) {
                 (Some(l), _) => {
-                    let diagonal = width * width + height * height;
                     seen.joints.add(&name, &[l.at[0] * width, l.at[1] * height], l.variance * diagonal);
                 }
                 (None, Some(at)) => seen.joints.add(&name, &at, 0.0),

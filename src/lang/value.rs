@@ -115,6 +115,8 @@ pub struct Located {
     pub observed: [f64; 2],
     /// Where the scene has it, in the same shares.
     pub own: [f64; 2],
+    /// The variance along an axis of the point about where the scene has it, as far as no observation tells of it; as `variance`.
+    pub own_variance: f64,
 }
 
 /// A log-density of an observed value given the scene: it scores; some can draw observations, none can be drawn with `~`.

@@ -4,7 +4,7 @@ use super::points::Points;
 use super::table::agree;
 use pcadlang::rng::{Purpose, StreamKey};
 use pcadlang::vision::chamfer::Mode;
-use pcadlang::vision::keypoints::Detection;
+use pcadlang::vision::keypoints::{Detection, RelativeDepthLikelihood};
 use pcadlang::vision::{
     Chamfer, ChamferOptions, ContourDetector, ContourMap, ContourRatio, ContourRatioOptions, DepthLikelihood, DepthMap,
     Elements, GradientDetector, KeypointLikelihood, KeypointOptions, Mask, MaskLikelihood, Photo, Region,
@@ -230,6 +230,13 @@ fn depths_masks_and_keypoints_score_anything() {
         let mask = Mask::new(1, 1, vec![true]).unwrap();
         points.check(MaskLikelihood::new(&mask, bad, 0.1).is_err(), || format!("a share of {bad}"));
         points.check(DepthLikelihood::new(&observed, 1.0, bad, (0.0, 1e38)).is_err(), || format!("outliers {bad}"));
+    }
+    for (sd, outlier) in [(1e-300, 1e-300), (0.1, 0.05), (1e8, 0.999)] {
+        let l = RelativeDepthLikelihood::new(sd, outlier).unwrap();
+        for (seen, model) in [(0.0, 0.0), (1e-300, 1e300), (-1e150, 0.0), (0.3, f64::INFINITY), (0.3, f64::NAN)] {
+            let (p, slope) = (l.log_density(seen, model), l.slope(seen, model));
+            points.check(p.is_finite() && slope.is_finite(), || format!("depth {seen} {model} {sd}: {p} {slope}"));
+        }
     }
     for sd in [1e-300, 1e-6, 1.0, 1e6, 1e8] {
         let l =

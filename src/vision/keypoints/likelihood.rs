@@ -35,6 +35,9 @@ pub struct KeypointOptions {
     pub unit: Unit,
     /// The share of joints that the model has further off; from 0 to less than 1.
     pub misses: f64,
+    /// How far joints are from where detector and model alike put them, as a standard deviation along each axis; not negative. No
+    /// detection tells of it, so it is in what is said of joints ([`KeypointLikelihood::located`]) and not in the density.
+    pub systematic: f64,
 }
 
 /// How much wider detections are spread about joints that the model misses: it is the model that is off.
@@ -42,7 +45,7 @@ const MISS: f64 = 8.0;
 
 impl Default for KeypointOptions {
     fn default() -> Self {
-        KeypointOptions { sd: 1.5, outlier: 0.05, offset: 0.0, unit: Unit::Diagonal, misses: 0.0 }
+        KeypointOptions { sd: 1.5, outlier: 0.05, offset: 0.0, unit: Unit::Diagonal, misses: 0.0, systematic: 0.0 }
     }
 }
 
@@ -83,6 +86,7 @@ pub struct KeypointLikelihood {
     offset: f64,
     outlier: f64,
     misses: f64,
+    systematic: f64,
     log_peak: f64,
     log_area: f64,
 }
@@ -105,10 +109,9 @@ impl KeypointLikelihood {
             Unit::Diagonal => (width * width + height * height).sqrt() / 100.0,
             Unit::Torso => positive("torso", torso)?,
         };
-        let offset = match options.offset {
-            0.0 => 0.0,
-            o => positive("offset", o)? * unit,
-        };
+        let not_negative = |name, value: f64| if value == 0.0 { Ok(0.0) } else { positive(name, value) };
+        let offset = not_negative("offset", options.offset)? * unit;
+        let systematic = not_negative("systematic", options.systematic)? * unit;
         let own = positive("sd", options.sd)? * unit;
         let sd = (own * own + offset * offset).sqrt();
         // Whose square is still a number.
@@ -123,12 +126,17 @@ impl KeypointLikelihood {
         }
         let log_peak = -libm::log(2.0 * std::f64::consts::PI * sd * sd);
         let log_area = libm::log(width * height);
-        Ok(KeypointLikelihood { width, height, sd, offset, outlier, misses, log_peak, log_area })
+        Ok(KeypointLikelihood { width, height, sd, offset, outlier, misses, systematic, log_peak, log_area })
     }
 
     /// The standard deviation of a good detection about the model's joint along each axis, in pixels.
     pub fn sd(&self) -> f64 {
         self.sd
+    }
+
+    /// The variance along an axis of a joint about where detector and model alike put it, in squared pixels.
+    pub fn systematic_variance(&self) -> f64 {
+        self.systematic * self.systematic
     }
 
     /// The probability that a detection of this confidence is off.
@@ -202,7 +210,7 @@ impl KeypointLikelihood {
             }
         }
         let apart = 0.5 * (square - shift[0] * shift[0] - shift[1] * shift[1]);
-        ([0, 1].map(|i| joint[i] + shift[i]), within + apart.max(0.0))
+        ([0, 1].map(|i| joint[i] + shift[i]), within + apart.max(0.0) + self.systematic_variance())
     }
 
     /// The place of a detection that is the likeliest to be meant.
@@ -353,6 +361,10 @@ mod tests {
             let (at, found) = m.located(&one(seen, confidence), joint);
             assert!((at[0] - mean[0]).abs() < 1e-3 && (at[1] - mean[1]).abs() < 1e-3, "{at:?} {mean:?}");
             assert!((found - variance).abs() < 1e-2, "{found} {variance}");
+            let wider = KeypointOptions { systematic: 0.4, ..options.clone() };
+            let wider = KeypointLikelihood::new(400.0, 300.0, 0.0, &wider).unwrap();
+            let (same, wide) = wider.located(&one(seen, confidence), joint);
+            assert!(same == at && (wide - found - 4.0).abs() < 1e-9, "two pixels more: {wide} {found}");
         }
         let exact = model(1.0, 0.05);
         assert_eq!(

@@ -23,6 +23,7 @@ mod matching;
 mod names;
 mod node;
 mod people;
+mod relative_depth;
 
 #[cfg(test)]
 mod calibration_tests;
@@ -32,6 +33,7 @@ pub use likelihood::{Detection, KeypointLikelihood, KeypointOptions, Unit};
 pub use matching::matching;
 pub use names::{COCO, MEDIAPIPE};
 pub use people::{People, split_id};
+pub use relative_depth::RelativeDepthLikelihood;
 
 use std::sync::Arc;
 

@@ -24,6 +24,9 @@ impl Laplace {
         if curvature.len() != n * n || curvature.iter().any(|c| !c.is_finite()) {
             return None;
         }
+        if n == 0 {
+            return Some(Laplace { mean, axes: Vec::new(), spreads: Vec::new() });
+        }
         let m = DMatrix::from_row_slice(n, n, curvature);
         let eigen = SymmetricEigen::try_new((&m + m.transpose()) * 0.5, 1e-12, 10_000)?;
         let spread = |c: &f64| 1.0 / c.clamp(CURVATURES.0, CURVATURES.1).sqrt();
@@ -107,6 +110,8 @@ mod tests {
         let l = Laplace::new(vec![0.0, 0.0], &[-3.0, 0.0, 0.0, 0.0]).unwrap();
         assert!(l.is_sound() && (l.log_density(&[4.0, 0.0]) - l.log_density(&[0.0, 0.0]) + 0.5).abs() < 1e-12);
         assert!(Laplace::new(vec![0.0], &[f64::NAN]).is_none() && Laplace::new(vec![0.0], &[]).is_none());
+        let point = Laplace::new(Vec::new(), &[]).unwrap();
+        assert!(point.is_sound() && point.log_density(&point.sample(&mut rng())) == 0.0, "of no dimensions");
         let mut broken = l;
         broken.axes.pop();
         assert!(!broken.is_sound());

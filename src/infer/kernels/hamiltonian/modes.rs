@@ -19,10 +19,12 @@ const STEP: f64 = 1e-4;
 /// Modes that are this much less likely than the best, in nats, are left out; and at most so many are kept.
 const BEHIND: f64 = 30.0;
 const MOST: usize = 6;
-/// Climbs whose heights differ by less, in nats, are of the same mode.
-const SAME: f64 = 1e-6;
+/// Climbs whose heights differ by less, in nats, and whose places by less along each coordinate, are of the same mode.
+const SAME: (f64, f64) = (1e-6, 1e-2);
 /// How many steps the choices climb that climb first.
 const FIRST: u32 = 8;
+/// How many steps the chain climbs from a mode of surrogates towards that of the observations themselves.
+const LAST: u32 = 40;
 /// The share of proposals that go to all modes alike: evidence is an estimate.
 const ALIKE: f64 = 0.1;
 
@@ -142,9 +144,26 @@ type State = Vec<(u64, Constraint)>;
 /// A climb that is under way.
 struct Climb {
     state: State,
+    /// Where the choices are.
+    discrete: Vec<Datum>,
+    y: Vec<f64>,
     /// The log density in the unconstrained space.
     height: f64,
     past: Past,
+}
+
+impl Climb {
+    fn new(state: State, height: f64) -> Climb {
+        Climb { state, discrete: Vec::new(), y: Vec::new(), height, past: Past::new() }
+    }
+
+    /// Whether it ended where a higher one did: modes that mirror each other are as high.
+    fn is_that_of(&self, higher: &Climb) -> bool {
+        higher.height - self.height < SAME.0
+            && self.discrete == higher.discrete
+            && self.y.len() == higher.y.len()
+            && self.y.iter().zip(&higher.y).all(|(a, b)| (a - b).abs() < SAME.1)
+    }
 }
 
 impl Modes {
@@ -189,8 +208,7 @@ impl Modes {
                 best.truncate(self.keep as usize);
             }
         }
-        let climb = |(state, height)| Climb { state, height, past: Past::new() };
-        Ok(best.into_iter().map(climb).collect())
+        Ok(best.into_iter().map(|(state, likely)| Climb::new(state, likely)).collect())
     }
 
     /// The ends of climbs, the highest first. Half of them go on after a quarter of the steps, and a quarter after half of them
@@ -205,12 +223,15 @@ impl Modes {
                 trace.restore(&c.state, at.draws(0))?;
                 let (targets, _) = self.scope.members(trace, at, &mut at.stream());
                 climb(trace, at, &targets, steps, &mut c.past)?;
-                let log_jacobian = Here::of(trace, &targets).map_or(0.0, |h| h.log_jacobian);
+                let mut log_jacobian = 0.0;
+                if let Some(here) = Here::of(trace, &targets) {
+                    (c.discrete, c.y, log_jacobian) = (here.discrete, here.y, here.log_jacobian);
+                }
                 (c.state, c.height) = (trace.constraints(), trace.log_joint() + log_jacobian);
             }
             climbs.sort_by(|a, b| b.height.total_cmp(&a.height));
-            climbs.dedup_by(|b, a| a.height - b.height < SAME);
-            climbs.truncate(self.keep.div_ceil(2 << round) as usize);
+            climbs.dedup_by(|b, a| b.is_that_of(a));
+            climbs.truncate((self.keep as usize).div_ceil(2 << round).max(MOST));
         }
         Ok(climbs)
     }
@@ -223,6 +244,11 @@ impl Modes {
         self.search(&mut twin, at)?;
         trace.propose_choices_of(&twin)?;
         trace.commit();
+        if at.adapting {
+            // The mode is the surrogates'; the observations' own is near it.
+            let (targets, _) = self.scope.members(trace, at, &mut at.stream());
+            climb(trace, &At { power: 1.0, ..*at }, &targets, LAST, &mut Past::new())?;
+        }
         Ok(())
     }
 

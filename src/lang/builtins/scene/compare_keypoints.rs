@@ -38,21 +38,29 @@ pub(super) const TABLE: &[Row] = &[native(
             "unit",
             Type::Str,
             "\"diagonal\"",
-            "What `sd` and `offset` are given in: \"diagonal\", percent of the picture's; \"torso\", lengths of the detected torso.",
+            "What `sd`, `offset` and `systematic` are given in: \"diagonal\", percent of the picture's; \"torso\", lengths of the detected torso.",
         ),
         opt("confidence", Type::Bool, "true", "Whether a detection that is not sure is the more often off."),
         opt("misses", Type::Num, "0", "The share of joints that the scene has further off: by 8 times the spread."),
+        opt(
+            "systematic",
+            Type::Num,
+            "0",
+            "How far joints are from where detector and scene alike put them: it widens what a run says of joints, not the density.",
+        )
+        .unit("percent of the diagonal"),
     ],
     Type::Likelihood,
     "The density of detected joints: each near its landmark or anywhere in the picture; what was not found says nothing.",
     |a| {
         let (outlier, offset, misses) = (a.num_or(2, 0.05)?, a.num_or(3, 0.0)?, a.num_or(6, 0.0)?);
+        let systematic = a.num_or(7, 0.0)?;
         let unit = match a.choice(4, &["diagonal", "torso"])? {
             "torso" => Unit::Torso,
             _ => Unit::Diagonal,
         };
         let (sd, by_joint) = spreads(a)?;
-        let options = KeypointOptions { sd, outlier, offset, unit, misses };
+        let options = KeypointOptions { sd, outlier, offset, unit, misses, systematic };
         if !(options.outlier > 0.0 && options.outlier < 1.0) {
             return Err(a.outside(2, "strictly between 0 and 1"));
         }
@@ -62,10 +70,13 @@ pub(super) const TABLE: &[Row] = &[native(
         if !(0.0..1.0).contains(&options.misses) {
             return Err(a.outside(6, "from 0 to less than 1"));
         }
+        if !(options.systematic >= 0.0 && options.systematic.is_finite()) {
+            return Err(a.outside(7, "not negative and finite"));
+        }
         likelihood(KeypointsOf { view: view(a)?, options, by_joint, confident: a.bool_or(5, true)? })
     },
 )
-.pull(|_, _, by| Some(std::iter::once(by.clone()).chain((0..6).map(|_| Adjoint::Unknown)).collect()))];
+.pull(|_, _, by| Some(std::iter::once(by.clone()).chain((0..7).map(|_| Adjoint::Unknown)).collect()))];
 
 #[derive(Debug)]
 struct KeypointsOf {
@@ -157,6 +168,7 @@ impl Likelihood for KeypointsOf {
                 variance: variance / (width * width + height * height),
                 observed: [seen[0] / width, seen[1] / height],
                 own: [joint[0] / width, joint[1] / height],
+                own_variance: term.model.systematic_variance() / (width * width + height * height),
             });
         };
         // What cannot be compared has failed before.

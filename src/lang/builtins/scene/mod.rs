@@ -7,6 +7,7 @@ mod adjoints;
 mod bodies;
 mod body_pulls;
 mod compare;
+mod compare_depths;
 mod compare_keypoints;
 mod edges;
 mod objects;
@@ -47,7 +48,8 @@ const fn native(
 
 /// All of them.
 pub(super) fn all() -> impl Iterator<Item = &'static Row> {
-    let comparing = [people::TABLE, compare::TABLE, compare_keypoints::TABLE, region::TABLE, edges::TABLE];
+    let keypoints = [people::TABLE, compare_keypoints::TABLE, compare_depths::TABLE];
+    let comparing = [compare::TABLE, region::TABLE, edges::TABLE].into_iter().chain(keypoints);
     let tables = [shapes::TABLE, bodies::TABLE, seeing::TABLE].into_iter().chain(comparing);
     tables.flatten()
 }

@@ -30,6 +30,7 @@ const ELSEWHERE: &[&str] = &[
     "logdet",
     "scene.render",
     "scene.keypoints",
+    "scene.relative_depth",
     "scene.chamfer",
     "scene.contour",
     "scene.depth",

@@ -1,0 +1,140 @@
+//! The likelihood of relative depths: how far in front of or behind the hips a network has the landmarks of a person.
+
+use super::adjoints::BySolid;
+use super::compare::{SECTION, SEEN, likelihood, view};
+use super::native;
+use crate::geom::Landmark;
+use crate::lang::adjoint::Adjoint;
+use crate::lang::builtins::{Row, Type, arg, opt};
+use crate::lang::value::{Likelihood, Value};
+use crate::render::View;
+use crate::rng::Stream;
+use crate::vision::keypoints::RelativeDepthLikelihood;
+use glam::DVec3;
+use std::sync::Arc;
+
+pub(super) const TABLE: &[Row] = &[native(
+    "relative_depth",
+    SECTION,
+    &[
+        SEEN,
+        arg("scale", Type::Num, "How long a metre is: the size of the body.").unit("scene units"),
+        opt("share", Type::Num, "1", "The share of a depth that the network tells: from one picture it tells too little."),
+        opt("sd", Type::Num, "0.1", "The spread of a good depth.").unit("metres"),
+        opt("outlier", Type::Num, "0.05", "The share of depths that are off."),
+    ],
+    Type::Likelihood,
+    "The density of depths of landmarks from the middle of the hips, as a network tells them from one picture: the last number of each \
+     of a record of points [right, down, away] in metres, such as `metres` of `scene.people`. Names that the scene lacks say nothing.",
+    |a| {
+        let (sd, outlier) = (a.positive_or(3, 0.1)?, a.num_or(4, 0.05)?);
+        let model = RelativeDepthLikelihood::new(sd, outlier).map_err(|_| match sd < 1e9 {
+            true => a.outside(4, "strictly between 0 and 1"),
+            false => a.outside(3, "less than 1e9"),
+        })?;
+        let (scale, share) = (a.positive_or(1, 1.0)?, a.positive_or(2, 1.0)?);
+        likelihood(RelativeDepthOf { view: view(a)?, scale, share, model })
+    },
+)
+.pull(|_, _, by| {
+    let unknown = || Adjoint::Unknown;
+    Some([by.element(0), by.element(1), unknown(), unknown(), unknown()].into_iter().collect())
+})];
+
+#[derive(Debug)]
+struct RelativeDepthOf {
+    view: Arc<View>,
+    /// Scene units in a metre.
+    scale: f64,
+    /// The share of a depth that is told.
+    share: f64,
+    model: RelativeDepthLikelihood,
+}
+
+/// One depth and the landmark it is of.
+struct Term<'a> {
+    name: &'a Arc<str>,
+    point: &'a [f64],
+    /// The landmark, by its place among the solid's, and as much of its depth in metres from the hips' as is told.
+    landmark: usize,
+    depth: f64,
+}
+
+impl RelativeDepthOf {
+    /// The two hips among the landmarks.
+    fn hips(&self, landmarks: &[Landmark]) -> Result<[usize; 2], String> {
+        let find = |name: &str| landmarks.iter().position(|l| &*l.name == name);
+        find("l_hip").zip(find("r_hip")).map(|(l, r)| [l, r]).ok_or_else(|| {
+            "scene.relative_depth: depths are from the middle of the hips, but the scene has no landmarks `l_hip` and `r_hip`".into()
+        })
+    }
+
+    fn each<'a>(&self, observed: &'a Value, mut f: impl FnMut(Term<'a>)) -> Result<(), String> {
+        let Value::Record(points) = observed else {
+            return Err(format!(
+                "scene.relative_depth: the observed value must be a record of points [right, down, away], got {}",
+                observed.type_name()
+            ));
+        };
+        let landmarks = self.view.solid().landmarks();
+        let hips = self.hips(landmarks)?;
+        let along = |i: usize| (landmarks[i].position - self.view.camera().eye).dot(self.view.camera().forward);
+        let middle = 0.5 * (along(hips[0]) + along(hips[1]));
+        for (name, point) in points.iter() {
+            let point = match point {
+                Value::Array(p) if p.len() == 3 && p.iter().all(|x| x.is_finite()) => p,
+                other => {
+                    return Err(format!(
+                        "scene.relative_depth: `{name}` must be three numbers [right, down, away], got {}",
+                        other.type_name()
+                    ));
+                }
+            };
+            let Some(landmark) = landmarks.iter().position(|l| l.name == *name) else { continue };
+            let depth = self.share * (along(landmark) - middle) / self.scale;
+            f(Term { name, point, landmark, depth });
+        }
+        Ok(())
+    }
+}
+
+impl Likelihood for RelativeDepthOf {
+    fn name(&self) -> &'static str {
+        "scene.relative_depth"
+    }
+
+    fn log_density(&self, observed: &Value) -> Result<f64, String> {
+        let mut sum = 0.0;
+        self.each(observed, |t| sum += self.model.log_density(t.point[2], t.depth))?;
+        Ok(sum)
+    }
+
+    /// Depths of the landmarks that the scene has; the others, and what is beside and above, stay.
+    fn sample(&self, observed: &Value, rng: &mut Stream) -> Option<Result<Value, String>> {
+        let Value::Record(points) = observed else { return None };
+        let mut drawn = (**points).clone();
+        let each = self.each(observed, |t| {
+            let away = self.model.sample(t.depth, rng);
+            drawn.insert(Arc::clone(t.name), Value::array(vec![t.point[0], t.point[1], away]));
+        });
+        Some(each.map(|()| Value::Record(Arc::new(drawn))))
+    }
+
+    /// By the view and by the scale.
+    fn gradient(&self, observed: &Value) -> Option<Adjoint> {
+        let landmarks = self.view.solid().landmarks();
+        let hips = self.hips(landmarks).ok()?;
+        let toward = self.view.camera().forward * (self.share / self.scale);
+        let mut all = vec![DVec3::ZERO; landmarks.len()];
+        let mut by_scale = 0.0;
+        let add = |t: Term| {
+            let slope = self.model.slope(t.point[2], t.depth);
+            all[t.landmark] += toward * slope;
+            hips.iter().for_each(|h| all[*h] -= toward * (0.5 * slope));
+            by_scale -= slope * t.depth / self.scale;
+        };
+        self.each(observed, add).ok()?;
+        let by_view = BySolid { landmarks: all, vertices: Vec::new() }.into_adjoint();
+        Some(Adjoint::List(vec![by_view, Adjoint::Num(by_scale)]))
+    }
+}
