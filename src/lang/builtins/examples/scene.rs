@@ -112,7 +112,9 @@ observe scene.keypoints(view) = points as joints;",
 data body = armature(\"std/human/human.lod2.rig.json\");
 assume turn ~ uniform(-pi, pi);
 assume s ~ lognormal(0.7, 0.3);
-let view = scene.render(scene.affine(rotate = [0, turn, 0], scale = s) * scene.skin(body, { head: [deg(20), 0, 0] }));
+let view = scene.render(
+  scene.affine(rotate = [0, turn, 0], scale = s) * scene.skin(body, { head: [deg(20), 0, 0] }),
+);
 let metres = { nose: [0.02, -0.7, -0.2], l_knee: [0.1, 0.4, -0.3] };   // as people[0].metres has them
 observe scene.relative_depth(view, s) = metres as depths;",
     ),

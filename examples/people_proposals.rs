@@ -1,0 +1,166 @@
+//! The paper's figure for people (Kulkarni et al. 2014, section 3.2): chains with and without discriminative proposals on one photograph,
+//! log joint density against time.
+//!
+//!     cargo run --release --example people_proposals -- examples/images/skier.jpg proposals.svg [CHAINS] [SECONDS]
+//!
+//! Both are `human.pcad` with the same likelihood, started from the prior, one chain a thread: with the jumps of `modes` (its search counts), and
+//! without them. Writes the figure, medians and quantiles as CSV beside it, and says when medians pass what the others end with.
+
+use pcadlang::Program;
+use pcadlang::infer::draws::{Column, DrawRow, Sink};
+use pcadlang::infer::{Progress, RunOptions};
+use pcadlang::lang::load;
+use std::fmt::Write;
+use std::io;
+use std::sync::{Arc, Mutex};
+use std::time::{Duration, Instant};
+
+/// Moments at which chains are compared, evenly spaced in the logarithm, from 10 ms.
+const MOMENTS: usize = 40;
+const QUANTILES: [f64; 5] = [0.05, 0.25, 0.5, 0.75, 0.95];
+
+/// The log joint density of a chain over its own time.
+#[derive(Default)]
+struct Path {
+    begun: Option<Instant>,
+    points: Vec<(f64, f64)>,
+}
+
+struct Recorder(Arc<Mutex<Path>>);
+
+impl Sink for Recorder {
+    fn columns(&mut self, _: &[Column]) -> io::Result<()> {
+        Ok(())
+    }
+
+    fn resume(&mut self) -> io::Result<Option<pcadlang::infer::Checkpoint>> {
+        if let Ok(mut path) = self.0.lock() {
+            path.begun = Some(Instant::now());
+        }
+        Ok(None)
+    }
+
+    fn draw(&mut self, row: &DrawRow) -> io::Result<()> {
+        if let Ok(mut path) = self.0.lock() {
+            let seconds = path.begun.map_or(0.0, |b| b.elapsed().as_secs_f64());
+            path.points.push((seconds, row.log_joint));
+        }
+        Ok(())
+    }
+
+    fn chain_done(&mut self, _: u32, _: u64, _: u64, _: f64) -> io::Result<()> {
+        Ok(())
+    }
+}
+
+/// `human.pcad` with a plan that records every step from its first on, with or without jumps.
+fn program(jumps: bool) -> Result<String, String> {
+    let text = load::embedded("human.pcad").ok_or("human.pcad is not shipped")?;
+    let plan = text.rfind("infer {").ok_or("human.pcad has no plan")?;
+    let text = format!("{}infer {{ repeat 1000000 {{ moves(); collect log_joint(); }} }}\n", &text[..plan]);
+    let with = "0.10 * (1 - blind) => modes(";
+    if !text.contains(with) {
+        return Err("human.pcad has no jumps".into());
+    }
+    Ok(if jumps { text } else { text.replace(with, "0 * (1 - blind) => modes(") })
+}
+
+/// The paths of so many chains.
+fn paths(image: &str, jumps: bool, chains: usize, seconds: f64) -> Result<Vec<Vec<(f64, f64)>>, String> {
+    let said = |e: pcadlang::Error| e.to_string();
+    let model = Program::parse(&program(jumps)?).and_then(|p| p.observe_file("photo", image)).and_then(Program::compile);
+    let model = model.map_err(said)?;
+    let threads = std::thread::available_parallelism().map_or(1, usize::from);
+    let mut all = Vec::new();
+    // As many at once as there are cores, so that each has one to itself and all have the same time.
+    for first in (0..chains).step_by(threads) {
+        let shared: Vec<Arc<Mutex<Path>>> = (first..chains.min(first + threads)).map(|_| Arc::default()).collect();
+        let sinks = shared.iter().map(|p| Box::new(Recorder(Arc::clone(p))) as Box<dyn Sink>).collect();
+        let time = Some(Duration::from_secs_f64(seconds));
+        let options = RunOptions { seed: first as u64 + 1, time, ..RunOptions::default() };
+        for chain in model.run_into(&options, threads, &Progress::default(), sinks).map_err(said)? {
+            chain.map_err(|e| format!("{e:?}"))?;
+        }
+        all.extend(shared.iter().filter_map(|p| Some(std::mem::take(&mut p.lock().ok()?.points))));
+    }
+    Ok(all)
+}
+
+/// Quantiles over chains at each moment; before its first draw a chain is nowhere.
+fn quantiles(paths: &[Vec<(f64, f64)>], moments: &[f64]) -> Vec<[f64; 5]> {
+    let at = |t: &f64| {
+        let value = |p: &Vec<(f64, f64)>| p[..p.partition_point(|(s, _)| s <= t)].last().map_or(f64::NEG_INFINITY, |x| x.1);
+        let mut here: Vec<f64> = paths.iter().map(value).collect();
+        here.sort_by(f64::total_cmp);
+        QUANTILES.map(|q| here[((here.len() - 1) as f64 * q).round() as usize])
+    };
+    moments.iter().map(at).collect()
+}
+
+/// Bands of quantiles and medians as SVG.
+fn figure(moments: &[f64], both: &[(&str, &str, Vec<[f64; 5]>)]) -> String {
+    let (width, height, left, bottom) = (720.0, 420.0, 70.0, 40.0);
+    let ends = (moments[0].ln(), moments[moments.len() - 1].ln());
+    // What is long past at a tenth of the time is not shown.
+    let late = moments.len() / 3;
+    let shown = || both.iter().flat_map(|b| b.2[late..].iter().flatten()).copied().filter(|x| x.is_finite());
+    let (low, high) = (shown().fold(f64::INFINITY, f64::min), shown().fold(f64::NEG_INFINITY, f64::max));
+    let x = |t: f64| left + (t.ln() - ends.0) / (ends.1 - ends.0) * (width - left - 20.0);
+    let y = |l: f64| height - bottom - ((l - low) / (high - low)).clamp(0.0, 1.0) * (height - bottom - 20.0);
+    let mut s = format!(
+        "<svg xmlns=\"http://www.w3.org/2000/svg\" viewBox=\"0 0 {width} {height}\" width=\"{width}\" height=\"{height}\" \
+         font-family=\"system-ui, sans-serif\" font-size=\"12\"><rect width=\"{width}\" height=\"{height}\" fill=\"#fff\"/>\n"
+    );
+    for t in [0.01f64, 0.03, 0.1, 0.3, 1.0, 3.0, 10.0].into_iter().filter(|t| t.ln() <= ends.1) {
+        let _ = writeln!(s, "<text x=\"{:.0}\" y=\"{}\" text-anchor=\"middle\">{t} s</text>", x(t), height - 20.0);
+    }
+    for i in 0..=4 {
+        let l = low + (high - low) * f64::from(i) / 4.0;
+        let _ = writeln!(s, "<text x=\"{}\" y=\"{:.0}\" text-anchor=\"end\">{l:.0}</text>", left - 6.0, y(l) + 4.0);
+    }
+    for (i, (name, colour, q)) in both.iter().enumerate() {
+        let there: Vec<usize> = (0..q.len()).filter(|j| q[*j][2].is_finite()).collect();
+        let point = |j: usize, k: usize| format!("{:.1},{:.1}", x(moments[j]), y(q[j][k]));
+        for (lo, hi) in [(0, 4), (1, 3)] {
+            let up = there.iter().map(|j| point(*j, lo));
+            let band: Vec<String> = up.chain(there.iter().rev().map(|j| point(*j, hi))).collect();
+            let _ = writeln!(s, "<polygon points=\"{}\" fill=\"{colour}\" opacity=\"0.2\"/>", band.join(" "));
+        }
+        let line: Vec<String> = there.iter().map(|j| point(*j, 2)).collect();
+        let _ = writeln!(
+            s,
+            "<polyline points=\"{}\" fill=\"none\" stroke=\"{colour}\" stroke-width=\"2\"/>\n\
+             <text x=\"{}\" y=\"{}\" fill=\"{colour}\">{name}: median, middle half, 90 %</text>",
+            line.join(" "),
+            left + 10.0,
+            30 + 18 * i
+        );
+    }
+    s + "</svg>\n"
+}
+
+fn main() -> Result<(), String> {
+    let args: Vec<String> = std::env::args().skip(1).collect();
+    let [image, out, rest @ ..] = &args[..] else { return Err("usage: IMG OUT.svg [CHAINS] [SECONDS]".into()) };
+    let number = |i: usize, other: f64| rest.get(i).map_or(Ok(other), |x| x.parse::<f64>().map_err(|e| e.to_string()));
+    let (chains, seconds) = (number(0, 100.0)? as usize, number(1, 6.0)?);
+    let moments: Vec<f64> =
+        (0..MOMENTS).map(|i| 0.01 * (seconds / 0.01).powf(i as f64 / (MOMENTS - 1) as f64)).collect();
+    let with = quantiles(&paths(image, true, chains, seconds)?, &moments);
+    let without = quantiles(&paths(image, false, chains, seconds)?, &moments);
+    let mut csv = String::from("seconds,with_q05,with_q25,with_q50,with_q75,with_q95,without_q05,without_q25,without_q50,without_q75,without_q95\n");
+    for (t, (a, b)) in moments.iter().zip(with.iter().zip(&without)) {
+        let numbers: Vec<String> = a.iter().chain(b).map(|x| format!("{x:.2}")).collect();
+        let _ = writeln!(csv, "{t:.4},{}", numbers.join(","));
+    }
+    let last = without.last().map_or(f64::NEG_INFINITY, |q| q[2]);
+    let passes = moments.iter().zip(&with).find(|(_, q)| q[2] >= last);
+    println!("median log joint after {seconds} s: {:.1} with jumps, {last:.1} without", with.last().map_or(f64::NAN, |q| q[2]));
+    match passes {
+        Some((t, _)) => println!("with jumps the median chain is there after {t:.2} s: {:.0} times sooner", seconds / t),
+        None => println!("with jumps the median chain does not get there"),
+    }
+    let both = [("with jumps", "#1f77b4", with), ("without", "#d62728", without)];
+    std::fs::write(out, figure(&moments, &both)).map_err(|e| format!("{out}: {e}"))?;
+    std::fs::write(format!("{out}.csv"), csv).map_err(|e| format!("{out}.csv: {e}"))
+}
