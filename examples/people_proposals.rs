@@ -53,11 +53,12 @@ impl Sink for Recorder {
     }
 }
 
-/// `human.pcad` with a plan that records every step from its first on, with or without jumps.
+/// `human.pcad` with a plan that records every step after a short warm-up, in which steps learn their size and the search for modes, if there is
+/// one, takes the chain to a mode; with or without jumps.
 fn program(jumps: bool) -> Result<String, String> {
     let text = load::embedded("human.pcad").ok_or("human.pcad is not shipped")?;
     let plan = text.rfind("infer {").ok_or("human.pcad has no plan")?;
-    let text = format!("{}infer {{ repeat 1000000 {{ moves(); collect log_joint(); }} }}\n", &text[..plan]);
+    let text = format!("{}infer {{ warmup 40 {{ moves(); }} repeat 1000000 {{ moves(); collect log_joint(); }} }}\n", &text[..plan]);
     let with = "0.10 * (1 - blind) => modes(";
     if !text.contains(with) {
         return Err("human.pcad has no jumps".into());
