@@ -58,7 +58,10 @@ impl Sink for Recorder {
 fn program(jumps: bool) -> Result<String, String> {
     let text = load::embedded("human.pcad").ok_or("human.pcad is not shipped")?;
     let plan = text.rfind("infer {").ok_or("human.pcad has no plan")?;
-    let text = format!("{}infer {{ warmup 40 {{ moves(); }} repeat 1000000 {{ moves(); collect log_joint(); }} }}\n", &text[..plan]);
+    let text = format!(
+        "{}infer {{ warmup 40 {{ moves(); }} repeat 1000000 {{ moves(); collect log_joint(); }} }}\n",
+        &text[..plan]
+    );
     let with = "0.10 * (1 - blind) => modes(";
     if !text.contains(with) {
         return Err("human.pcad has no jumps".into());
@@ -69,7 +72,8 @@ fn program(jumps: bool) -> Result<String, String> {
 /// The paths of so many chains.
 fn paths(image: &str, jumps: bool, chains: usize, seconds: f64) -> Result<Vec<Vec<(f64, f64)>>, String> {
     let said = |e: pcadlang::Error| e.to_string();
-    let model = Program::parse(&program(jumps)?).and_then(|p| p.observe_file("photo", image)).and_then(Program::compile);
+    let model =
+        Program::parse(&program(jumps)?).and_then(|p| p.observe_file("photo", image)).and_then(Program::compile);
     let model = model.map_err(said)?;
     let threads = std::thread::available_parallelism().map_or(1, usize::from);
     let mut all = Vec::new();
@@ -90,7 +94,8 @@ fn paths(image: &str, jumps: bool, chains: usize, seconds: f64) -> Result<Vec<Ve
 /// Quantiles over chains at each moment; before its first draw a chain is nowhere.
 fn quantiles(paths: &[Vec<(f64, f64)>], moments: &[f64]) -> Vec<[f64; 5]> {
     let at = |t: &f64| {
-        let value = |p: &Vec<(f64, f64)>| p[..p.partition_point(|(s, _)| s <= t)].last().map_or(f64::NEG_INFINITY, |x| x.1);
+        let value =
+            |p: &Vec<(f64, f64)>| p[..p.partition_point(|(s, _)| s <= t)].last().map_or(f64::NEG_INFINITY, |x| x.1);
         let mut here: Vec<f64> = paths.iter().map(value).collect();
         here.sort_by(f64::total_cmp);
         QUANTILES.map(|q| here[((here.len() - 1) as f64 * q).round() as usize])
@@ -149,16 +154,23 @@ fn main() -> Result<(), String> {
         (0..MOMENTS).map(|i| 0.01 * (seconds / 0.01).powf(i as f64 / (MOMENTS - 1) as f64)).collect();
     let with = quantiles(&paths(image, true, chains, seconds)?, &moments);
     let without = quantiles(&paths(image, false, chains, seconds)?, &moments);
-    let mut csv = String::from("seconds,with_q05,with_q25,with_q50,with_q75,with_q95,without_q05,without_q25,without_q50,without_q75,without_q95\n");
+    let mut csv = String::from(
+        "seconds,with_q05,with_q25,with_q50,with_q75,with_q95,without_q05,without_q25,without_q50,without_q75,without_q95\n",
+    );
     for (t, (a, b)) in moments.iter().zip(with.iter().zip(&without)) {
         let numbers: Vec<String> = a.iter().chain(b).map(|x| format!("{x:.2}")).collect();
         let _ = writeln!(csv, "{t:.4},{}", numbers.join(","));
     }
     let last = without.last().map_or(f64::NEG_INFINITY, |q| q[2]);
     let passes = moments.iter().zip(&with).find(|(_, q)| q[2] >= last);
-    println!("median log joint after {seconds} s: {:.1} with jumps, {last:.1} without", with.last().map_or(f64::NAN, |q| q[2]));
+    println!(
+        "median log joint after {seconds} s: {:.1} with jumps, {last:.1} without",
+        with.last().map_or(f64::NAN, |q| q[2])
+    );
     match passes {
-        Some((t, _)) => println!("with jumps the median chain is there after {t:.2} s: {:.0} times sooner", seconds / t),
+        Some((t, _)) => {
+            println!("with jumps the median chain is there after {t:.2} s: {:.0} times sooner", seconds / t)
+        }
         None => println!("with jumps the median chain does not get there"),
     }
     let both = [("with jumps", "#1f77b4", with), ("without", "#d62728", without)];

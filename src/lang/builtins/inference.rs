@@ -200,7 +200,7 @@ pub(super) const TABLE: &[Row] = &[
         Type::Kernel,
         "Jumps between modes. Its first step looks for them: the likeliest of some draws of the selected choices climb by L-BFGS, of \
          which half, and half again, go on to the top; in warm-up the state then becomes one of the modes, drawn by the Laplace estimates \
-         of their evidence. From then on all selected choices are proposed together from the Laplace approximations of all modes \
+         of their evidence, and with `at` climbs on under the observations themselves (what no surrogate asks for is not among the modes). From then on all selected choices are proposed together from the Laplace approximations of all modes \
          (independent Metropolis-Hastings, Tierney 1994).",
     ),
     name(

@@ -82,14 +82,16 @@ pub(super) const TABLE: &[Row] = &[native(
 struct KeypointsOf {
     view: Arc<View>,
     options: KeypointOptions,
-    /// Joints with a spread of their own.
-    by_joint: Vec<(Arc<str>, f64)>,
+    by_joint: ByJoint,
     /// Whether confidences count.
     confident: bool,
 }
 
+/// Joints with a spread of their own.
+type ByJoint = Vec<(Arc<str>, f64)>;
+
 /// The spread of joints, and those with one of their own.
-fn spreads(a: &Args) -> Result<(f64, Vec<(Arc<str>, f64)>), Fault> {
+fn spreads(a: &Args) -> Result<(f64, ByJoint), Fault> {
     let Value::Record(record) = a.get(1) else { return Ok((a.positive_or(1, 1.5)?, Vec::new())) };
     let positive = |v: &Value| match v {
         Value::Num(x) if *x > 0.0 && x.is_finite() => Ok(*x),
