@@ -107,7 +107,7 @@ fn quantiles(paths: &[Vec<(f64, f64)>], moments: &[f64]) -> Vec<[f64; 5]> {
 fn figure(moments: &[f64], both: &[(&str, &str, Vec<[f64; 5]>)]) -> String {
     let (width, height, left, bottom) = (720.0, 420.0, 70.0, 40.0);
     let ends = (moments[0].ln(), moments[moments.len() - 1].ln());
-    // What is long past at a tenth of the time is not shown.
+    // The scale is that of the later moments: starts from the prior are far below.
     let late = moments.len() / 3;
     let shown = || both.iter().flat_map(|b| b.2[late..].iter().flatten()).copied().filter(|x| x.is_finite());
     let (low, high) = (shown().fold(f64::INFINITY, f64::min), shown().fold(f64::NEG_INFINITY, f64::max));
@@ -149,7 +149,10 @@ fn main() -> Result<(), String> {
     let args: Vec<String> = std::env::args().skip(1).collect();
     let [image, out, rest @ ..] = &args[..] else { return Err("usage: IMG OUT.svg [CHAINS] [SECONDS]".into()) };
     let number = |i: usize, other: f64| rest.get(i).map_or(Ok(other), |x| x.parse::<f64>().map_err(|e| e.to_string()));
-    let (chains, seconds) = (number(0, 100.0)? as usize, number(1, 6.0)?);
+    let (chains, seconds) = (number(0, 100.0)? as usize, number(1, 1.5)?);
+    if chains == 0 || !(seconds > 0.01 && seconds < 1e6) {
+        return Err("at least one chain and more than 0.01 seconds are needed".into());
+    }
     let moments: Vec<f64> =
         (0..MOMENTS).map(|i| 0.01 * (seconds / 0.01).powf(i as f64 / (MOMENTS - 1) as f64)).collect();
     let with = quantiles(&paths(image, true, chains, seconds)?, &moments);

@@ -1,5 +1,5 @@
 #!/bin/sh
-# Measures the fronts of speed and accuracy of docs/accuracy.md, and writes the presets of lathe.pcad and human.pcad anew: under two hours
+# Measures the fronts of speed and accuracy of docs/accuracy.md, and writes the presets of lathe.pcad anew: under two hours
 # on two cores that do nothing else. Taken up where it was interrupted when it is told the same OUT.
 #
 #     examples/accuracy/run.sh OBJECTS PEOPLE OUT
