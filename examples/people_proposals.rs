@@ -1,4 +1,4 @@
-//! The paper's figure for people (Kulkarni et al. 2014, section 3.2): chains with and without discriminative proposals on one photograph,
+//! The paper's figure for people (Kulkarni et al. 2014, section 4.2.1): chains with and without discriminative proposals on one photograph,
 //! log joint density against time.
 //!
 //!     cargo run --release --example people_proposals -- examples/images/skier.jpg proposals.svg [CHAINS] [SECONDS]

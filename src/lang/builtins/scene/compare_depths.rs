@@ -1,7 +1,7 @@
 //! The likelihood of relative depths: how far in front of or behind the hips a network has the landmarks of a person.
 
 use super::adjoints::BySolid;
-use super::compare::{SECTION, SEEN, likelihood, view};
+use super::compare::{SECTION, SEEN, by_view, likelihood, view};
 use super::native;
 use crate::geom::Landmark;
 use crate::lang::adjoint::Adjoint;
@@ -37,8 +37,9 @@ pub(super) const TABLE: &[Row] = &[native(
     },
 )
 .pull(|_, _, by| {
-    let unknown = || Adjoint::Unknown;
-    Some([by.element(0), by.element(1), unknown(), unknown(), unknown()].into_iter().collect())
+    let mut pulled = by_view(by.element(0), 4);
+    pulled[1] = by.element(1);
+    Some(pulled)
 })];
 
 #[derive(Debug)]

@@ -4,7 +4,7 @@
 //! detections belong to.
 
 use super::adjoints::BySolid;
-use super::compare::{SECTION, SEEN, likelihood, same_shape, view};
+use super::compare::{SECTION, SEEN, by_view, likelihood, same_shape, view};
 use super::observed::KeypointsValue;
 use super::{ViewValue, native};
 use crate::diag::nearest;
@@ -76,7 +76,7 @@ pub(super) const TABLE: &[Row] = &[native(
         likelihood(KeypointsOf { view: view(a)?, options, by_joint, confident: a.bool_or(5, true)? })
     },
 )
-.pull(|_, _, by| Some(std::iter::once(by.clone()).chain((0..7).map(|_| Adjoint::Unknown)).collect()))];
+.pull(|_, _, by| Some(by_view(by.clone(), 7)))];
 
 #[derive(Debug)]
 struct KeypointsOf {
