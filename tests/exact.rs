@@ -519,6 +519,32 @@ fn jumps_between_modes_keep_their_weights() {
     }
 }
 
+/// Modes that mirror each other are as high as each other, and are two all the same.
+#[test]
+fn modes_that_mirror_each_other_are_both_visited() {
+    let d = run(
+        "assume x ~ normal(0, 2); observe normal(x * x, 1) = 9;
+         kernel jump() { modes(@x, tries = 40, keep = 8, steps = 40); }
+         infer { warmup 1 { jump(); } repeat 40000 { jump(); collect x; } }",
+        1,
+        2,
+    );
+    let positive: Vec<f64> = d["x"].iter().map(|x| f64::from(u8::from(*x > 0.0))).collect();
+    assert_mean("mirrored modes", &positive, 0.5, 0.02);
+}
+
+/// The search goes by surrogates, whose mode is 1; the chain climbs on from there to the observation's own.
+#[test]
+fn a_search_by_surrogates_ends_at_the_mode_of_the_observations() {
+    let d = run(
+        "assume x ~ normal(0, 1); observe normal(x, 0.1) = 2 with coarse = normal(x, 1) as y;
+         infer { warmup 1 { modes(@x, tries = 8, keep = 4, steps = 40, at = @y); } repeat 1 { collect x; } }",
+        1,
+        1,
+    );
+    assert!((d["x"][0] - 200.0 / 101.0).abs() < 1e-5, "{}", d["x"][0]);
+}
+
 /// Annealed particles estimate the evidence, here known, and their states are draws from the posterior.
 #[test]
 fn particles_give_the_evidence() {

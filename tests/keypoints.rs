@@ -191,6 +191,24 @@ fn a_run_leaves_where_the_joints_are() {
     assert!(!f.exists("a/keypoints.json"), "nothing of an earlier run stays");
 }
 
+/// Errors that no detection tells of: the same draws, and wider intervals of joints and of the body's own.
+#[test]
+fn systematic_errors_widen_what_is_said_and_nothing_else() {
+    let f = folder("keypoints_systematic");
+    f.succeeds(&run(&["--keypoints", "one.json", "--out", "a"]));
+    f.write("bar.pcad", BAR.replace("sd = sd)", "sd = sd, systematic = 2)"));
+    f.succeeds(&run(&["--keypoints", "one.json", "--out", "b"]));
+    let json =
+        |dir: &str| -> serde_json::Value { serde_json::from_str(&f.read(&format!("{dir}/keypoints.json"))).unwrap() };
+    let (a, b) = (json("a"), json("b"));
+    assert_eq!((&a["best"], &a["scene"]), (&b["best"], &b["scene"]), "the density is as it was");
+    let error = 0.02 * f64::hypot(440.0, 220.0);
+    for (of, joint) in [("keypoints", "nose"), ("body", "nose"), ("body", "l_ankle")] {
+        let [before, after] = [&a, &b].map(|j| j[of][joint][2].as_f64().unwrap());
+        assert!((after - f64::hypot(before, error)).abs() < 0.01, "{of} {joint}: {before} {after}");
+    }
+}
+
 #[test]
 fn the_means_are_those_of_the_collected_draws() {
     let f = folder("keypoints_means");
