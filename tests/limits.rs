@@ -140,6 +140,21 @@ fn draws_from_before_are_kept() {
     assert!(begun.elapsed() > Duration::from_secs(2), "nothing was given up");
 }
 
+/// A search ends with what it found by then, so that there is time to draw.
+#[test]
+fn a_search_for_modes_ends_when_time_is_up() {
+    let text = "assume x ~ normal(0, 1); let s = sum(map(fn(i) { i * x }, 0 .. 1000));
+        observe normal(x + 0 * s, 0.1) = 2;
+        infer { warmup 1 { modes(@x, tries = 1000000, keep = 8, steps = 40); } repeat 1 { mh(@x); collect x; } }";
+    let model = Model::from_text(text).unwrap_or_else(|e| panic!("{e}"));
+    let options = RunOptions { time: Some(Duration::from_millis(400)), ..RunOptions::default() };
+    let posterior = model.run(&options, 1, 1).unwrap_or_else(|e| panic!("{e}"));
+    assert!(posterior.chains[0].warmup == 1 && posterior.chains[0].seconds < 10.0, "the search took all time");
+    // The likeliest draw of those that there was time for, at least.
+    let Value::Num(x) = posterior.chains[0].last.get("@x").unwrap() else { panic!("not a number") };
+    assert!((x - 200.0 / 101.0).abs() < 1.0, "{x}");
+}
+
 /// What may draw a picture counts as many operations: it is given up sooner.
 #[test]
 fn observations_that_may_be_slow_are_stopped_sooner() {

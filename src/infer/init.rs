@@ -1,6 +1,10 @@
 //! Starts: traces of positive probability, and what to say when there is none.
 
+use super::build::arguments;
 use super::expr::{Scope, evaluate};
+use super::kernel::At;
+use super::kernels::Own;
+use super::kernels::own::proposes;
 use super::plan::{ChainError, RunOptions, argument, call};
 use super::selection::fail;
 use crate::lang::address::Address;
@@ -88,13 +92,33 @@ pub(crate) fn attempts<T>(most: u64, mut draw: impl FnMut(u64) -> TraceResult<T>
 /// # Errors
 /// If the program fails, or if no draw has positive probability within the bounded retries.
 pub fn starts(code: &Arc<Code>, seed: u64, chain: u32, how: Start, limits: Limits) -> Result<Vec<Trace>, StartError> {
+    starts_from(code, (seed, chain), how, None, limits)
+}
+
+/// The same, each draw moved by what a kernel of the program proposes there.
+pub(crate) fn starts_from(
+    code: &Arc<Code>,
+    (seed, chain): (u64, u32),
+    how: Start,
+    from: Option<&Own>,
+    limits: Limits,
+) -> Result<Vec<Trace>, StartError> {
     let (key, begun) = (StreamKey::new(seed, chain, Purpose::START), Instant::now());
+    let drawn = |attempt: u64| -> TraceResult<Option<Trace>> {
+        let draws = Draws { key, step: attempt, lane: 0 };
+        let mut trace = Trace::simulate(Arc::clone(code), draws, limits.clone())?;
+        let Some(from) = from else { return Ok(Some(trace)) };
+        // Steps of the plan count from 0: this is apart from all of them.
+        let at = At::new(seed, chain, attempt).within(u64::MAX - 1);
+        Ok(from.leap(&mut trace, &at)?.map(|()| trace))
+    };
     let mut best: Vec<Trace> = Vec::new();
     let mut found = 0;
     let mut last = None;
     for attempt in 0..how.draws.saturating_add(RETRIES) {
-        match Trace::simulate(Arc::clone(code), Draws { key, step: attempt, lane: 0 }, limits.clone()) {
-            Ok(t) if t.log_joint() > f64::NEG_INFINITY => {
+        match drawn(attempt) {
+            Ok(None) => {}
+            Ok(Some(t)) if t.log_joint() > f64::NEG_INFINITY => {
                 found += 1;
                 let place = best.partition_point(|b| b.log_joint() >= t.log_joint());
                 if place < how.keep.max(1) {
@@ -102,7 +126,7 @@ pub fn starts(code: &Arc<Code>, seed: u64, chain: u32, how: Start, limits: Limit
                     best.truncate(how.keep.max(1));
                 }
             }
-            Ok(t) => last = Some(Ok(t)),
+            Ok(Some(t)) => last = Some(Ok(t)),
             Err(e) if e.is_recoverable() => last = Some(Err(e)),
             Err(e) => return Err(StartError::Run(e)),
         }
@@ -134,12 +158,17 @@ fn explain(t: &Trace) -> NoStart {
 }
 
 /// What the `init` statement of a plan asks for. Where there is a limit of time, a quarter of it: as much as is left to warm-up.
-pub(crate) fn start_of(code: &Arc<Code>, plan: &[KStmt], options: &RunOptions) -> Result<Start, ChainError> {
+/// And the kernel whose proposals it takes, if it takes any.
+pub(crate) fn start_of(
+    code: &Arc<Code>,
+    plan: &[KStmt],
+    options: &RunOptions,
+) -> Result<(Start, Option<Own>), ChainError> {
     let init = plan.iter().find_map(|s| match &s.kind {
         KStmtKind::Expr(e) => call(e).filter(|(name, _)| *name == "init").map(|(_, args)| (e, args)),
         _ => None,
     });
-    let Some((e, args)) = init else { return Ok(Start::default()) };
+    let Some((e, args)) = init else { return Ok((Start::default(), None)) };
     let wrong = || ChainError::Run(fail(e.span, "init takes prior() or best_of(n)".into()));
     let [how] = args else { return Err(wrong()) };
     let mut trace = Trace::prior(Arc::clone(code), options.limits.clone());
@@ -152,12 +181,31 @@ pub(crate) fn start_of(code: &Arc<Code>, plan: &[KStmt], options: &RunOptions) -
         }
     };
     match call(&how.value) {
-        Some(("prior", [])) => Ok(Start::default()),
+        Some(("prior", [])) => Ok((Start::default(), None)),
         Some(("best_of", args)) => {
             let draws = argument(args, 0, "n").map_or(Err(wrong()), &mut count)?;
             let keep = argument(args, 1, "keep").map_or(Ok(1), &mut count)?;
-            Ok(Start { draws, keep: keep.min(draws) as usize, within: options.time.map(|t| t / 4) })
+            let from = argument(args, 2, "from").map(|e| own(code, e, options)).transpose()?;
+            Ok((Start { draws, keep: keep.min(draws) as usize, within: options.time.map(|t| t / 4) }, from))
         }
         _ => Err(wrong()),
     }
+}
+
+/// The kernel of the program that a start is proposed by.
+fn own(code: &Arc<Code>, e: &Expr, options: &RunOptions) -> Result<Own, ChainError> {
+    let wrong = || {
+        let mut wrong = fail(e.span, "a start is proposed by a kernel of the program".into());
+        wrong.hint =
+            Some("kernel near() { propose @x ~ normal(2, 0.1); } infer { init(best_of(20, from = near())); … }".into());
+        ChainError::Run(wrong)
+    };
+    let (name, args) = call(e).ok_or_else(wrong)?;
+    let declared = code.kernels.iter().find(|k| &*k.name.node == name && proposes(&k.body)).ok_or_else(wrong)?;
+    let mut trace = Trace::prior(Arc::clone(code), options.limits.clone());
+    let started = Instant::now();
+    let (draws, variables) = (Draws::default(), &[]);
+    let mut env = Scope { code, trace: &mut trace, variables, draws, started, steps: 0, moved: None };
+    let arguments = arguments(declared, args, e.span, &mut env)?;
+    Ok(Own::new(Arc::clone(code), declared.clone(), arguments, started))
 }

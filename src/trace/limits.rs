@@ -112,7 +112,12 @@ impl Stop {
 
     /// Whether it has been asked for, or time is up.
     pub fn is_asked(&self) -> bool {
-        self.is_set() || self.time.is_some_and(|(from, t)| from.elapsed() >= t)
+        self.has_used(1.0)
+    }
+
+    /// Whether it has been asked for, or this share of the time has gone by.
+    pub fn has_used(&self, share: f64) -> bool {
+        self.is_set() || self.time.is_some_and(|(from, t)| from.elapsed() >= t.mul_f64(share))
     }
 }
 

@@ -530,6 +530,11 @@ impl Trace {
         self.graph.limits = limits;
     }
 
+    /// What ends its updates, and the searches among them.
+    pub(crate) fn stop(&self) -> &Stop {
+        &self.graph.limits.stop
+    }
+
     /// Starts to note which operations are executed.
     #[doc(hidden)]
     pub fn watch(&mut self) {

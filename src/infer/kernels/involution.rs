@@ -77,15 +77,6 @@ fn near(a: &Value, b: &Value) -> bool {
     }
 }
 
-/// The log density of drawing these auxiliary values.
-fn log_density(played: &Played, values: &[Value]) -> f64 {
-    let one = |(d, v): (&super::own::Drawn, &Value)| match v.to_datum() {
-        Some(x) if d.dist.support().fits(&x) => d.dist.log_density(&x),
-        _ => f64::NEG_INFINITY,
-    };
-    played.drawn.iter().zip(values).map(one).sum()
-}
-
 impl Own {
     /// One step by a map.
     pub(super) fn involve(&self, trace: &mut Trace, at: &At) -> TraceResult<Outcome> {
@@ -116,11 +107,13 @@ impl Own {
         let auxiliaries: Vec<Value> = forth_map.iter().filter(|m| m.choice.is_none()).map(|m| m.new.clone()).collect();
         let back = recoverable(self.play(trace, at, Source::Given(&auxiliaries), Some(&[])));
         let (log_back, wrong) = match &back {
-            Ok(Some(back)) => (log_density(back, &auxiliaries), self.does_not_return(&forth_map, &mapped(back, trace))),
+            Ok(Some(back)) => {
+                (back.log_density_of(&auxiliaries), self.does_not_return(&forth_map, &mapped(back, trace)))
+            }
             _ => (f64::NEG_INFINITY, None),
         };
         let drawn: Vec<Value> = forth.drawn.iter().map(|d| d.value.clone()).collect();
-        let ratio = at.tempered(&w) + log_back - log_density(&forth, &drawn) + log_jacobian;
+        let ratio = at.tempered(&w) + log_back - forth.log_density_of(&drawn) + log_jacobian;
         // A place that the auxiliary variables cannot lead back from is refused, whatever the map does there.
         let wrong = wrong.filter(|_| log_back > f64::NEG_INFINITY);
         if wrong.is_none() && back.is_ok() && accepts(ratio, &mut rng) {

@@ -2,7 +2,8 @@
 //!
 //! The body is played on the present state and draws from each `propose @x ~ d` as it comes; then all choices change at
 //! once. The density of the way back is found by replay: the body is played again on the new state, with the old values as
-//! what it would have to draw. Bodies with maps are moves of their own: see `involution.rs`. Every expression reads the state the play began in, never a value proposed in it.
+//! what it would have to draw, and with the same auxiliary variables (`propose u ~ d`), so that each value of these is a
+//! proposal of its own. A choice that is stored as white noise is proposed by its value, which the noise follows. Bodies with maps are moves of their own: see `involution.rs`. Every expression reads the state the play began in, never a value proposed in it.
 
 use crate::dist::{Datum, Dist};
 use crate::infer::expr::{Scope, evaluate};
@@ -54,6 +55,17 @@ pub(super) struct Played {
     pub images: Vec<(Image, Value)>,
 }
 
+impl Played {
+    /// The log density of drawing these values of its auxiliary variables.
+    pub(super) fn log_density_of(&self, values: &[Value]) -> f64 {
+        let one = |(d, v): (&Drawn, &Value)| match v.to_datum() {
+            Some(x) if d.dist.support().fits(&x) => d.dist.log_density(&x),
+            _ => f64::NEG_INFINITY,
+        };
+        self.drawn.iter().zip(values).map(one).sum()
+    }
+}
+
 /// Where the values of auxiliary variables come from.
 pub(super) enum Source<'a> {
     Drawn(&'a mut Stream),
@@ -82,9 +94,23 @@ impl Own {
         Ok(play.played)
     }
 
-    /// What a body without a map proposes.
-    fn proposals(&self, trace: &mut Trace, at: &At) -> TraceResult<Vec<Proposed>> {
-        Ok(self.play(trace, at, Source::Given(&[]), None)?.all)
+    /// A jump to what the body proposes, whatever the densities say: a start. `None` where the program has no value there.
+    ///
+    /// # Errors
+    /// As [`Kernel::step`], and if the body has a map, which only leads from one state to another.
+    pub fn leap(&self, trace: &mut Trace, at: &At) -> TraceResult<Option<()>> {
+        if maps(&self.declared.body) {
+            let message = "a start proposes choices by distributions, not by a map";
+            return Err(fail(self.declared.name.span, message.into()));
+        }
+        let mut rng = at.stream();
+        let forth = self.play(trace, at, Source::Drawn(&mut rng), None)?;
+        let (_, changes) = sampled(&forth.all, &mut rng);
+        let led = recoverable(trace.propose(&changes, at.draws(0)))?;
+        if led.is_some() {
+            trace.commit();
+        }
+        Ok(led.map(|_| ()))
     }
 }
 
@@ -166,11 +192,6 @@ impl Play<'_> {
         trace: &mut Trace,
         variables: &[(Arc<str>, Value)],
     ) -> TraceResult<Value> {
-        if self.moved.is_none() {
-            let mut e = fail(dist.span, format!("`{name}` is an auxiliary variable, which belongs to a map"));
-            e.hint = Some(format!("propose @x = value(@x) + {name}; propose {name} = -{name};"));
-            return Err(e);
-        }
         let dist = self.distribution(dist, trace, variables)?;
         let value = match &mut self.source {
             Source::Drawn(rng) => Value::from_datum(&dist.sample(rng)),
@@ -187,7 +208,11 @@ impl Play<'_> {
         trace: &mut Trace,
         variables: &[(Arc<str>, Value)],
     ) -> TraceResult<Proposed> {
-        let (_, target) = self.choice(target, trace, variables)?;
+        let (address, found) = self.choice(target, trace, variables)?;
+        if trace.elements(found).is_some() {
+            return Err(fail(target.span, format!("{address} cannot be proposed as a whole")));
+        }
+        let target = found;
         Ok(Proposed { target, dist: self.distribution(dist, trace, variables)? })
     }
 
@@ -201,7 +226,11 @@ impl Play<'_> {
     /// What a map gives a new value to.
     fn image(&self, target: &Expr, trace: &mut Trace, variables: &[(Arc<str>, Value)]) -> TraceResult<Image> {
         let ExprKind::Var(name) = &target.kind else {
-            return self.choice(target, trace, variables).map(|(address, t)| Image::Choice(address, t));
+            let (address, found) = self.choice(target, trace, variables)?;
+            if trace.elements(found).is_some() || trace.dist(found).is_some_and(|d| d.is_stored_whitened()) {
+                return Err(fail(target.span, format!("{address} cannot be mapped as a whole")));
+            }
+            return Ok(Image::Choice(address, found));
         };
         let drawn = self.played.drawn.iter().rposition(|d| d.name == *name);
         let not = || fail(target.span, format!("`{name}` is no auxiliary variable: propose {name} ~ …; makes one"));
@@ -221,10 +250,6 @@ impl Play<'_> {
             e.hint = Some("a kernel can only propose choices that are there; mh and block make others appear".into());
             return Err(e);
         };
-        if trace.elements(found).is_some() || trace.dist(found).is_some_and(|d| d.is_stored_whitened()) {
-            let message = format!("{at} cannot be proposed as a whole");
-            return Err(fail(target.span, message));
-        }
         Ok((at, found))
     }
 }
@@ -247,8 +272,28 @@ fn maps(body: &[KStmt]) -> bool {
     })
 }
 
-fn old_values(trace: &Trace, all: &[Proposed]) -> Vec<Option<Datum>> {
-    all.iter().map(|p| trace.stored(p.target)).collect()
+/// What choices are now, as the program sees them.
+fn values(trace: &Trace, all: &[Proposed]) -> Vec<Option<Datum>> {
+    all.iter().map(|p| trace.value(p.target).to_datum()).collect()
+}
+
+/// Values drawn for all choices that are proposed, and the changes to them.
+fn sampled(all: &[Proposed], rng: &mut Stream) -> (Vec<Option<Datum>>, Vec<(Target, Change)>) {
+    let draw = |p: &Proposed| {
+        let x = p.dist.sample(rng);
+        (Some(x.clone()), (p.target, Change::Value(x)))
+    };
+    all.iter().map(draw).unzip()
+}
+
+/// The log of how much larger a volume of values is than that of the white noise they are stored as, over all of these choices.
+fn log_volume(trace: &Trace, all: &[Proposed]) -> f64 {
+    let one = |p: &Proposed| {
+        let dist = trace.dist(p.target).filter(Dist::is_stored_whitened)?;
+        let (noise, value) = (trace.stored(p.target)?, trace.value(p.target).to_datum()?);
+        Some(dist.log_density_stored(&noise) - dist.centred().log_density(&value))
+    };
+    all.iter().filter_map(one).sum()
 }
 
 /// The log density of drawing these values; what a proposal cannot draw has none.
@@ -270,30 +315,36 @@ impl Kernel for Own {
             return self.involve(trace, at);
         }
         let mut rng: Stream = at.stream();
-        let forth = self.proposals(trace, at)?;
-        if forth.is_empty() {
+        let forth = self.play(trace, at, Source::Drawn(&mut rng), None)?;
+        if forth.all.is_empty() {
             return Ok(Outcome::default());
         }
-        let old = old_values(trace, &forth);
-        let new: Vec<Option<Datum>> = forth.iter().map(|p| Some(p.dist.sample(&mut rng))).collect();
-        let change = |(p, x): (&Proposed, &Option<Datum>)| Some((p.target, Change::Set(x.clone()?)));
-        let changes: Vec<_> = forth.iter().zip(&new).filter_map(change).collect();
+        let (old, volume) = (values(trace, &forth.all), log_volume(trace, &forth.all));
+        let undo: Vec<_> =
+            forth.all.iter().filter_map(|p| Some((p.target, Change::Set(trace.stored(p.target)?)))).collect();
+        let (new, changes) = sampled(&forth.all, &mut rng);
         let Some(w) = recoverable(trace.propose(&changes, at.draws(0)))? else { return Ok(Outcome::failed()) };
-        if forth.iter().any(|p| trace.was_removed(p.target)) || w.log_weight == f64::NEG_INFINITY {
+        if forth.all.iter().any(|p| trace.was_removed(p.target)) || w.log_weight == f64::NEG_INFINITY {
             trace.rollback();
             return Ok(Outcome::one(false));
         }
         // The replay asks the new state, which must not be pending for that.
         let removed = trace.removed();
         trace.commit();
-        let back = recoverable(self.proposals(trace, at))?;
-        let same = |back: &Vec<Proposed>| back.iter().map(|p| p.target).eq(forth.iter().map(|p| p.target));
-        let log_back = back.filter(same).map_or(f64::NEG_INFINITY, |back| log_density(&back, &old));
-        let ratio = at.tempered(&w) + log_back - log_density(&forth, &new);
-        if accepts(ratio, &mut rng) {
+        let auxiliaries: Vec<Value> = forth.drawn.iter().map(|d| d.value.clone()).collect();
+        let back = recoverable(self.play(trace, at, Source::Given(&auxiliaries), None))?;
+        let same = |back: &Played| {
+            back.drawn.len() == forth.drawn.len()
+                && back.all.iter().map(|p| p.target).eq(forth.all.iter().map(|p| p.target))
+        };
+        let log_back = back
+            .filter(same)
+            .map_or(f64::NEG_INFINITY, |back| log_density(&back.all, &old) + back.log_density_of(&auxiliaries));
+        let log_forth = log_density(&forth.all, &new) + forth.log_density_of(&auxiliaries);
+        let grown = volume - log_volume(trace, &forth.all);
+        if accepts(at.tempered(&w) + log_back - log_forth + grown, &mut rng) {
             return Ok(Outcome::one(true));
         }
-        let undo: Vec<_> = forth.iter().zip(&old).filter_map(change).collect();
         trace.propose_constrained(&undo, &removed, at.draws(1))?;
         trace.commit();
         Ok(Outcome::one(false))

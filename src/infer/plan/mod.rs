@@ -10,7 +10,7 @@ mod warmup;
 pub use checkpoint::Checkpoint;
 
 use super::draws::{KernelStats, Sink, SiteStats};
-use super::init::{StartError, start_of, starts};
+use super::init::{StartError, start_of, starts_from};
 use super::neighbours::Banks;
 use super::population::Population;
 use super::state::StateError;
@@ -175,9 +175,10 @@ pub(crate) fn run_chain(
         banks::check(plan, options)?;
         return Runner::resume(code, plan, options, progress, sink, chain, checkpoint)?.run(plan);
     }
-    let how = start_of(code, plan, options)?;
+    let (how, from) = start_of(code, plan, options)?;
     banks::check(plan, options)?;
-    let mut begun = starts(code, options.seed, chain, how, options.limits.clone()).map_err(ChainError::Start)?;
+    let mut begun = starts_from(code, (options.seed, chain), how, from.as_ref(), options.limits.clone())
+        .map_err(ChainError::Start)?;
     for trace in &mut begun {
         super::force::apply(code, trace, options, chain)?;
     }

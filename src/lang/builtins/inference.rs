@@ -251,6 +251,12 @@ pub(super) const TABLE: &[Row] = &[
                 "1",
                 "How many of the best begin a population that `anneal` thins out to one state.",
             ),
+            opt(
+                "from",
+                Type::Kernel,
+                "none",
+                "A kernel of the program, by whose proposals each draw is moved before they are compared, whatever their densities say.",
+            ),
         ],
         Type::Kernel,
         "A start: the draw from the prior with the highest log joint density.",

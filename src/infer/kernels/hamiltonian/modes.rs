@@ -25,6 +25,8 @@ const SAME: (f64, f64) = (1e-6, 1e-2);
 const FIRST: u32 = 8;
 /// How many steps the chain climbs from a mode of surrogates towards that of the observations themselves.
 const LAST: u32 = 40;
+/// The share of a run's time after which a search ends with what it has: draws need the rest.
+const SEARCH: f64 = 0.75;
 /// The share of proposals that go to all modes alike: evidence is an estimate.
 const ALIKE: f64 = 0.1;
 
@@ -191,6 +193,9 @@ impl Modes {
             best.push((trace.constraints(), trace.log_likelihood()));
         }
         for i in 0..self.tries {
+            if trace.stop().has_used(SEARCH) && !best.is_empty() {
+                break;
+            }
             let at = at.within(u64::from(i));
             let (targets, _) = self.scope.members(trace, &at, &mut at.stream());
             if recoverable(trace.regenerate(&targets, at.draws(0)))?.is_none() {
@@ -219,7 +224,12 @@ impl Modes {
         for (round, share) in [4, 2, 1].into_iter().enumerate() {
             let steps = self.steps / share - gone;
             gone += steps;
+            let mut climbed = 0;
             for c in &mut climbs {
+                if trace.stop().has_used(SEARCH) && (round > 0 || climbed > 0) {
+                    break;
+                }
+                climbed += 1;
                 trace.restore(&c.state, at.draws(0))?;
                 let (targets, _) = self.scope.members(trace, at, &mut at.stream());
                 climb(trace, at, &targets, steps, &mut c.past)?;
@@ -228,6 +238,10 @@ impl Modes {
                     (c.discrete, c.y, log_jacobian) = (here.discrete, here.y, here.log_jacobian);
                 }
                 (c.state, c.height) = (trace.constraints(), trace.log_joint() + log_jacobian);
+            }
+            if round == 0 {
+                // Where they begin is not as high as where they would have ended.
+                climbs.truncate(climbed);
             }
             climbs.sort_by(|a, b| b.height.total_cmp(&a.height));
             climbs.dedup_by(|b, a| b.is_that_of(a));
@@ -268,6 +282,9 @@ impl Modes {
                 |m: &Mode| m.discrete == here.discrete && m.about.distance(&here.y) < 0.25 * here.y.len() as f64;
             if *signature.get_or_insert_with(|| here.signature.clone()) != here.signature || modes.iter().any(known) {
                 continue;
+            }
+            if trace.stop().has_used(SEARCH) && !modes.is_empty() {
+                break;
             }
             let Some(about) = curved(trace, at, &targets, here.y)? else { continue };
             modes.push(Mode { discrete: here.discrete, log_share: height + about.log_volume(), about });
