@@ -180,3 +180,24 @@ fn starts_are_proposed_by_a_kernel() {
         assert!(e.contains(said), "{from}: {e}");
     }
 }
+
+/// A body that reads choices alone is played while the new state is pending, any other once it is taken up: the same draws.
+#[test]
+fn ways_back_are_the_same_however_they_are_found() {
+    let draws = |here: &str| {
+        let text = format!(
+            "assume x ~ normal(0, 1); f ~ gp(mean = 0, cov = sq_exp(1, exp(x)), at = [0, 1]);
+             observe normal(x + f[0], 0.5) = 2;
+             let twice = 2 * x; let values = f + 0;
+             kernel step() {{
+               propose s ~ lognormal(-1, if {here} > 1 {{ 0.5 }} else {{ 1 }});
+               propose @x ~ normal(0.7 * {here} + 0.3, s);
+               propose @f ~ mv_normal({here} * 0.2 + 0.5 * values, cov = s * identity(2));
+             }}
+             infer {{ repeat 2000 {{ step(); collect x, f[1]; }} }}"
+        );
+        let text = if here == "value(@x)" { text.replace("0.5 * values", "0.5 * value(@f)") } else { text };
+        run(&text, 1, 2)
+    };
+    assert_eq!(draws("value(@x)"), draws("(0.5 * twice)"));
+}

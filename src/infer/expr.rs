@@ -95,7 +95,26 @@ pub(crate) fn evaluate(e: &Expr, env: &mut Scope) -> Result<Value, Box<RunError>
             }
             let values: Result<Vec<Value>, _> = args.iter().map(|a| evaluate(&a.value, env)).collect();
             let values = values?;
-            builtin(name, &values.iter().collect::<Vec<_>>(), e, env)
+            let builtins = &env.code.builtins;
+            let Some(called) = builtins.find("", name).map(|i| builtins.get(i)) else {
+                return builtin(name, &[], e, env);
+            };
+            // As many as it has, those left out as nothing: keywords may change the order.
+            let order = called.match_names(args.iter().map(|a| a.name.as_ref().map(|n| &*n.node)));
+            let order = order.map_err(|message| fail(e.span, message))?;
+            let placed: Vec<&Value> = order.iter().map(|i| i.map_or(&Value::Unit, |i| &values[i])).collect();
+            builtin(name, &placed, e, env)
+        }
+        ExprKind::If { cond, then, otherwise } => {
+            let taken = match evaluate(cond, env)? {
+                Value::Bool(true) => then,
+                Value::Bool(false) => otherwise,
+                v => return Err(fail(cond.span, format!("a condition is a bool, got {}", v.type_name()))),
+            };
+            match (&taken.stmts[..], &taken.result) {
+                ([], Some(result)) => evaluate(result, env),
+                _ => Err(unsupported(e)),
+            }
         }
         _ => Err(unsupported(e)),
     }

@@ -7,7 +7,7 @@
 
 use crate::dist::{Datum, Dist};
 use crate::infer::expr::{Scope, evaluate};
-use crate::infer::kernel::{At, Kernel, Outcome, accepts, recoverable};
+use crate::infer::kernel::{At, Kernel, Outcome, accepts, recoverable, settle};
 use crate::infer::selection::{address, fail};
 use crate::lang::code::Code;
 use crate::lang::value::Value;
@@ -28,6 +28,7 @@ pub(crate) struct Own {
 
 /// One `propose` of a play.
 pub(super) struct Proposed {
+    address: Address,
     target: Target,
     dist: Dist,
 }
@@ -92,6 +93,21 @@ impl Own {
         let mut variables = self.arguments.clone();
         play.body(&self.declared.body, trace, &mut variables)?;
         Ok(play.played)
+    }
+
+    /// What the body proposes in the state that is pending, if it reads nothing of it but choices: then the state need not be taken
+    /// up to be asked, nor left again.
+    fn way_back(
+        &self,
+        trace: &mut Trace,
+        at: &At,
+        all: &[Proposed],
+        new: &[Option<Datum>],
+        auxiliaries: &[Value],
+    ) -> Option<Played> {
+        let moved = all.iter().zip(new).map(|(p, x)| Some((p.address.clone(), Value::from_datum(x.as_ref()?))));
+        let moved: Vec<(Address, Value)> = moved.collect::<Option<_>>()?;
+        self.play(trace, at, Source::Given(auxiliaries), Some(&moved)).ok()
     }
 
     /// A jump to what the body proposes, whatever the densities say: a start. `None` where the program has no value there.
@@ -161,7 +177,7 @@ impl Play<'_> {
                         variables.push((Arc::clone(name), value));
                         continue;
                     }
-                    if self.moved.is_some() {
+                    if maps(&self.own.declared.body) {
                         let mut e = fail(s.span, "a kernel with a map draws auxiliary variables only".into());
                         e.hint = Some("propose u ~ normal(0, 1); propose @x = value(@x) + u; propose u = -u;".into());
                         return Err(e);
@@ -212,8 +228,7 @@ impl Play<'_> {
         if trace.elements(found).is_some() {
             return Err(fail(target.span, format!("{address} cannot be proposed as a whole")));
         }
-        let target = found;
-        Ok(Proposed { target, dist: self.distribution(dist, trace, variables)? })
+        Ok(Proposed { address, target: found, dist: self.distribution(dist, trace, variables)? })
     }
 
     fn distribution(&self, dist: &Expr, trace: &mut Trace, variables: &[(Arc<str>, Value)]) -> TraceResult<Dist> {
@@ -328,21 +343,27 @@ impl Kernel for Own {
             trace.rollback();
             return Ok(Outcome::one(false));
         }
+        let auxiliaries: Vec<Value> = forth.drawn.iter().map(|d| d.value.clone()).collect();
+        let log_forth = log_density(&forth.all, &new) + forth.log_density_of(&auxiliaries);
+        let ratio = |trace: &Trace, back: Option<Played>| {
+            let back = back.filter(|back| {
+                back.drawn.len() == forth.drawn.len()
+                    && back.all.iter().map(|p| p.target).eq(forth.all.iter().map(|p| p.target))
+            });
+            let log_back =
+                back.map_or(f64::NEG_INFINITY, |back| log_density(&back.all, &old) + back.log_density_of(&auxiliaries));
+            at.tempered(&w) + log_back - log_forth + volume - log_volume(trace, &forth.all)
+        };
+        if w.appeared + w.vanished == 0
+            && let Some(back) = self.way_back(trace, at, &forth.all, &new, &auxiliaries)
+        {
+            return Ok(settle(trace, ratio(trace, Some(back)), &mut rng));
+        }
         // The replay asks the new state, which must not be pending for that.
         let removed = trace.removed();
         trace.commit();
-        let auxiliaries: Vec<Value> = forth.drawn.iter().map(|d| d.value.clone()).collect();
         let back = recoverable(self.play(trace, at, Source::Given(&auxiliaries), None))?;
-        let same = |back: &Played| {
-            back.drawn.len() == forth.drawn.len()
-                && back.all.iter().map(|p| p.target).eq(forth.all.iter().map(|p| p.target))
-        };
-        let log_back = back
-            .filter(same)
-            .map_or(f64::NEG_INFINITY, |back| log_density(&back.all, &old) + back.log_density_of(&auxiliaries));
-        let log_forth = log_density(&forth.all, &new) + forth.log_density_of(&auxiliaries);
-        let grown = volume - log_volume(trace, &forth.all);
-        if accepts(at.tempered(&w) + log_back - log_forth + grown, &mut rng) {
+        if accepts(ratio(trace, back), &mut rng) {
             return Ok(Outcome::one(true));
         }
         trace.propose_constrained(&undo, &removed, at.draws(1))?;

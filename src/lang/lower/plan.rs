@@ -326,8 +326,23 @@ impl Lowerer<'_> {
                 self.plan_expr(left, around);
                 self.plan_expr(right, around);
             }
-            _ => {}
+            ExprKind::If { cond, then, otherwise } => {
+                self.plan_expr(cond, around);
+                for body in [then, otherwise] {
+                    match (&body.stmts[..], &body.result) {
+                        ([], Some(result)) => self.plan_expr(result, around),
+                        _ => self.not_in_a_plan(e.span),
+                    }
+                }
+            }
+            ExprKind::Lambda(_) => self.not_in_a_plan(e.span),
+            ExprKind::Num(_) | ExprKind::Str(_) | ExprKind::Bool(_) | ExprKind::Error => {}
         }
+    }
+
+    fn not_in_a_plan(&mut self, span: Span) {
+        self.error("this expression cannot be used in an inference block", span, "a function, or statements")
+            .hint_also("bind it outside: let name = …; of the program, and use the name here");
     }
 
     /// An expression of the model that draws are made of: a slot of the top level.
