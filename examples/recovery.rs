@@ -42,18 +42,17 @@ fn truth(trace: &mut Trace, column: &str) -> Option<f64> {
     }
 }
 
+/// Knots of the profile.
+const KNOTS: usize = 24;
+
 /// The radius at 51 heights from the bottom to the top, as fractions of the height; `get` reads a column.
 fn shape(get: &mut dyn FnMut(&str) -> f64) -> Vec<f64> {
-    let (h, c) = (get("H"), get("c"));
-    let mut points = Vec::new();
-    for (part, lo, hi) in [("lower", 0.0, c), ("upper", c, 1.0)] {
-        points.extend((0..10).map(|i| (lo + (hi - lo) * f64::from(i) / 9.0, get(&format!("{part}/r[{i}]")) / h)));
-    }
+    let h = get("H");
+    let radii: Vec<f64> = (0..KNOTS).map(|i| get(&format!("r[{i}]")) / h).collect();
     let at = |y: f64| {
-        let i = points.partition_point(|p| p.0 <= y).clamp(1, points.len() - 1);
-        let (a, b) = (points[i - 1], points[i]);
-        let t = if b.0 > a.0 { ((y - a.0) / (b.0 - a.0)).clamp(0.0, 1.0) } else { 0.5 };
-        a.1 + t * (b.1 - a.1)
+        let place = (y * KNOTS as f64 - 0.5).clamp(0.0, (KNOTS - 1) as f64);
+        let i = (place as usize).min(KNOTS - 2);
+        radii[i] + (place - i as f64) * (radii[i + 1] - radii[i])
     };
     (0..=50).map(|i| at(f64::from(i) / 50.0)).collect()
 }

@@ -19,13 +19,14 @@ fi
 mkdir -p "$3" && cd "$3"
 
 # Variants with other kernels. A bank belongs to the text of its program, so each size has a program.
-sed -e 's|= edges as distance;|= edges with coarse = scene.chamfer(view, sigma = sigma, symmetric = true, truncate = truncate, size = 40) as distance;|' \
-    -e 's|=> drift(\$affine + @H + @r0);|=> delayed(drift($affine + @H + @r0), at = @distance);|' \
-    -e 's|=> drift(\$profile);|=> delayed(drift($profile), at = @distance);|' \
+sed -e 's|= edges as picture;|= edges with coarse = scene.contour(view, size = 40) as picture;|' \
+    -e 's|= photo as colour;|= photo with coarse = flat() as colour;|' \
+    -e 's|=> drift(\$affine + @H + @r0);|=> delayed(drift($affine + @H + @r0), at = @picture + @colour);|' \
+    -e 's|=> drift(\$profile);|=> delayed(drift($profile), at = @picture + @colour);|' \
     "$root/programs/lathe.pcad" > lathe_delayed.pcad
 camera=$(find "$objects" -name camera.json | sort | head -n 1)
 for n in 1000 20000; do
-  sed "s|=> elliptical(one(\$profile));|&\n        0.05 => knn(@**, bank = \"lathe_$n.bank\", k = 10);|" \
+  sed "s|=> drift(\$wall);|&\n        0.05 => knn(@**, bank = \"lathe_$n.bank\", k = 10);|" \
     "$root/programs/lathe.pcad" > lathe_bank_$n.pcad
   [ -e lathe_$n.bank ] || "$PCADLANG" learn lathe_bank_$n.pcad -n $n -o lathe_$n.bank ${camera:+--camera "$camera"}
 done

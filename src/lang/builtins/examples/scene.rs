@@ -61,6 +61,13 @@ let view = scene.render(scene.box(1), camera = above);",
     ),
     ("scene.render", "scene.render(scene.sphere(1)) // a view"),
     (
+        "scene.bounds",
+        "\
+assume r ~ uniform(0.5, 4);
+let reach = scene.bounds(scene.render(scene.sphere(r)));
+factor(-100 * max(reach[2] - 1, 0));  // it is probably all in the picture",
+    ),
+    (
         "scene.contour",
         seen!("data photo = image(\"ball.png\");", "observe scene.contour(view, size = 32) = photo as picture;"),
     ),
@@ -77,6 +84,13 @@ let view = scene.render(scene.box(1), camera = above);",
 data photo = image(\"ball.png\");
 let people = scene.people(photo);
 assume tall ~ normal(if len(people) > 0 { people[0].torso } else { 0 }, 1);",
+    ),
+    (
+        "scene.candidates",
+        "\
+data photo = image(\"ball.png\");
+let found = scene.candidates(photo, most = 5);
+assume tall ~ lognormal(log(if len(found) > 0 { found[0].axes[0].length } else { 1 }), 0.1);",
     ),
     (
         "scene.chamfer",

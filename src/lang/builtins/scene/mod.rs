@@ -6,6 +6,7 @@
 mod adjoints;
 mod bodies;
 mod body_pulls;
+mod candidates;
 mod compare;
 mod compare_depths;
 mod compare_keypoints;
@@ -48,7 +49,7 @@ const fn native(
 
 /// All of them.
 pub(super) fn all() -> impl Iterator<Item = &'static Row> {
-    let keypoints = [people::TABLE, compare_keypoints::TABLE, compare_depths::TABLE];
+    let keypoints = [people::TABLE, candidates::TABLE, compare_keypoints::TABLE, compare_depths::TABLE];
     let comparing = [compare::TABLE, region::TABLE, edges::TABLE].into_iter().chain(keypoints);
     let tables = [shapes::TABLE, bodies::TABLE, seeing::TABLE].into_iter().chain(comparing);
     tables.flatten()

@@ -2,6 +2,7 @@
 //! once, on first use, and kept beside them.
 
 use crate::lang::value::{Object, Value};
+use crate::vision::candidates::{Candidate, CandidateOptions};
 use crate::vision::people::Person;
 use crate::vision::{
     Chamfer, ChamferOptions, ContourDetector, ContourMap, ContourRatio, ContourRatioOptions, DepthLikelihood, DepthMap,
@@ -58,6 +59,8 @@ pub struct ImageValue {
     pub(super) regions: Prepared<Key<RegionOptions>, Region>,
     /// The same photograph with contours found otherwise: by what, and how strong they must be.
     detected: Prepared<(GradientDetector, f32), Value>,
+    /// What may be objects in it, by how they were looked for.
+    pub(super) candidates: Prepared<CandidateOptions, Vec<Candidate>>,
     /// The people in the photograph, by how they were looked for: views, and how many at most.
     pub(super) people: Prepared<(u32, u32), Vec<(Person, Value)>>,
 }

@@ -83,4 +83,55 @@ pub(super) const TABLE: &[Row] = &[
         },
     )
     .pull(|_, _, by| Some(smallvec![by.clone(), Adjoint::Unknown, Adjoint::Unknown])),
+    native(
+        "bounds",
+        SECTION,
+        &[arg("view", VIEW, "The view.")],
+        Type::Array,
+        "How far the picture of a solid reaches: left, top, right and bottom of all its vertices, as fractions of the picture's sides, so \
+         that below 0 and above 1 is out of the picture. Infinite if it reaches behind the camera, or has no vertex.",
+        |a| {
+            let view = a.object::<ViewValue>(0, "a view")?;
+            let (camera, mut b) = (view.0.camera(), [f64::INFINITY, f64::INFINITY, f64::NEG_INFINITY, f64::NEG_INFINITY]);
+            for v in view.0.solid().vertices() {
+                let (x, y, depth) = camera.project(v);
+                if depth.is_nan() || depth <= Camera::NEAR {
+                    b = [f64::NEG_INFINITY, f64::NEG_INFINITY, f64::INFINITY, f64::INFINITY];
+                    break;
+                }
+                let (x, y) = (x / f64::from(camera.width), y / f64::from(camera.height));
+                b = [b[0].min(x), b[1].min(y), b[2].max(x), b[3].max(y)];
+            }
+            Ok(Value::array(b.to_vec()))
+        },
+    ),
 ];
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+    use crate::geom::Affine;
+    use glam::DVec3;
+
+    fn bounds(at: DVec3) -> Vec<f64> {
+        let cube = crate::geom::cuboid(DVec3::splat(1.0)).map(|m| crate::geom::Solid::new(Arc::new(m))).unwrap();
+        let solid = cube.placed(Affine::new(at, DVec3::ZERO, DVec3::ONE));
+        let view = Value::object(ViewValue(Arc::new(View::with_detail(solid, Camera::default_for(256, 256), 0.0))));
+        let table = crate::lang::builtins::Table::default();
+        let builtin = table.get(table.find("scene", "bounds").unwrap());
+        builtin.apply(&[&view]).unwrap().numbers()
+    }
+
+    #[test]
+    fn bounds_of_a_cube() {
+        // Half a unit at depth 7.5 is 8 / 4.4 * 0.5 / 7.5 of the picture.
+        let half = 8.0 / 4.4 * 0.5 / 7.5;
+        let b = bounds(DVec3::ZERO);
+        for (b, expected) in b.iter().zip([0.5 - half, 0.5 - half, 0.5 + half, 0.5 + half]) {
+            assert!((b - expected).abs() < 1e-9, "{b} {expected}");
+        }
+        let out = bounds(DVec3::new(4.0, 0.0, 0.0));
+        assert!(out[0] > 1.0 && out[2] > out[0], "{out:?}");
+        assert_eq!(bounds(DVec3::new(0.0, 0.0, 8.0))[2], f64::INFINITY);
+    }
+}

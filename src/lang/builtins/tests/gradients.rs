@@ -12,7 +12,9 @@ use std::collections::HashSet;
 /// Functions without a derivative, and why.
 const NONE: &[(&str, &str)] = &[
     ("scene.autorig", "joints are found by search"),
+    ("scene.bounds", "they jump from vertex to vertex"),
     ("scene.camera", "cameras are not differentiated"),
+    ("scene.candidates", "regions are found in a photograph, which nothing moves"),
     ("scene.edges", "contours are found in a photograph, which nothing moves"),
     ("scene.people", "people are found in a photograph, which nothing moves"),
 ];

@@ -1,0 +1,112 @@
+//! Mirror symmetry of a region: the axes in which it is most its own mirror image, and its widths
+//! along them. The silhouette of a lathe is symmetric in the projection of its axis, seen from
+//! anywhere far enough away.
+
+use super::area::Area;
+use std::f64::consts::PI;
+
+/// The angles that are tried first, over half a turn.
+const ANGLES: usize = 60;
+/// About how many pixels they are tried on.
+const SAMPLE: usize = 200;
+/// Second axes are at least this far from the first, radians.
+const APART: f64 = PI / 6.0;
+
+/// A line to mirror in: the points whose product with the unit `normal` is `offset`, pixels.
+#[derive(Clone, Copy, Debug)]
+pub struct Mirror {
+    /// Intersection over union of the region with its mirror image.
+    pub symmetry: f64,
+    /// Of the normal, radians.
+    pub angle: f64,
+    /// From the region's centroid along the normal.
+    pub offset: f64,
+    /// The centroid.
+    pub centre: [f64; 2],
+}
+
+/// A region's points about its centroid.
+struct Shape<'a> {
+    area: &'a Area,
+    centre: [f64; 2],
+    points: Vec<[f64; 2]>,
+}
+
+impl Shape<'_> {
+    fn of(area: &Area, most: usize) -> Shape<'_> {
+        let mut centre = [0.0; 2];
+        for (i, j) in area.points() {
+            centre[0] += i as f64 + 0.5;
+            centre[1] += j as f64 + 0.5;
+        }
+        let centre = centre.map(|c| c / area.count as f64);
+        let step = area.count.div_ceil(most).max(1);
+        let about = |(i, j): (usize, usize)| [i as f64 + 0.5 - centre[0], j as f64 + 0.5 - centre[1]];
+        Shape { area, centre, points: area.points().step_by(step).map(about).collect() }
+    }
+
+    /// The mirror at an angle and offset, with its symmetry.
+    fn mirror(&self, angle: f64, offset: f64) -> Mirror {
+        let (nx, ny) = (libm::cos(angle), libm::sin(angle));
+        let hits = self.points.iter().filter(|[x, y]| {
+            let twice = 2.0 * (nx * x + ny * y - offset);
+            self.area.at(x - twice * nx + self.centre[0], y - twice * ny + self.centre[1])
+        });
+        let hits = hits.count() as f64;
+        let symmetry = hits / (2.0 * self.points.len() as f64 - hits);
+        Mirror { symmetry, angle, offset, centre: self.centre }
+    }
+
+    /// The best mirror near another: steps of the given size in angle and offset, halved `halvings`
+    /// times.
+    fn refined(&self, from: Mirror, angle: f64, offset: f64, halvings: i32) -> Mirror {
+        let mut best = self.mirror(from.angle, from.offset);
+        for h in 0..=halvings {
+            let (a, o) = (angle / f64::from(1 << h), offset / f64::from(1 << h));
+            // A few steps at each size: the scan was near already.
+            for _ in 0..3 {
+                let tries = [(-a, 0.0), (a, 0.0), (0.0, -o), (0.0, o)];
+                let last = best;
+                for (da, d) in tries {
+                    let next = self.mirror(last.angle + da, last.offset + d);
+                    best = if next.symmetry > best.symmetry { next } else { best };
+                }
+                if best.symmetry <= last.symmetry {
+                    break;
+                }
+            }
+        }
+        best
+    }
+}
+
+/// The angle between two lines, radians.
+fn between(a: f64, b: f64) -> f64 {
+    let d = (a - b).rem_euclid(PI);
+    d.min(PI - d)
+}
+
+/// The symmetry of a region in its best mirror, roughly: what many regions are compared by.
+pub fn symmetry(area: &Area) -> f64 {
+    let shape = Shape::of(area, SAMPLE);
+    let scan = (0..ANGLES / 2).map(|i| shape.mirror(PI * i as f64 / (ANGLES / 2) as f64, 0.0));
+    let best = scan.reduce(|best, m| if m.symmetry > best.symmetry { m } else { best });
+    best.map_or(0.0, |b| shape.refined(b, PI / 60.0, 1.0, 1).symmetry)
+}
+
+/// The best mirror, and the best of those in a direction of its own.
+pub fn mirrors(area: &Area) -> Vec<Mirror> {
+    let (rough, all) = (Shape::of(area, SAMPLE), Shape::of(area, usize::MAX));
+    let angle = |i: usize| PI * i as f64 / ANGLES as f64;
+    let mut scan: Vec<Mirror> = (0..ANGLES).map(|i| rough.mirror(angle(i), 0.0)).collect();
+    scan.sort_by(|a, b| b.symmetry.total_cmp(&a.symmetry));
+    let refined = |m: &Mirror| all.refined(*m, PI / 120.0, 1.0, 4);
+    // Neighbouring angles are much the same on few points: the best three are refined.
+    let better = |a: Mirror, b: Mirror| if b.symmetry > a.symmetry { b } else { a };
+    let Some(first) = scan.iter().take(3).map(refined).reduce(better) else { return Vec::new() };
+    let second = scan.iter().find(|m| between(m.angle, first.angle) > APART + 0.05).map(refined);
+    let second = second.filter(|m| between(m.angle, first.angle) >= APART);
+    let mut out: Vec<Mirror> = [first].into_iter().chain(second).collect();
+    out.sort_by(|a, b| b.symmetry.total_cmp(&a.symmetry));
+    out
+}

@@ -1,0 +1,72 @@
+//! A small picture as the search for candidates sees it: colours in CIE L*a*b*, how much lightness
+//! varies around a pixel, and gradients.
+
+use crate::vision::Photo;
+use crate::vision::color::linear_to_labs;
+use crate::vision::gradient::{Gradient, colour_gradient, derivatives, smoothed};
+
+/// Standard deviation, pixels, of the smoothing before colours are compared (Felzenszwalb &
+/// Huttenlocher 2004, section 4).
+const SMOOTHING: f32 = 0.8;
+/// That of the Gaussian in which lightness varies.
+const AROUND: f32 = 2.0;
+/// Gradients as strong as this part of a picture's pixels have, and stronger, are edges beyond
+/// doubt.
+const STRONG: f64 = 0.97;
+
+/// A picture at the working resolution; lists run row by row.
+pub struct Picture {
+    pub width: usize,
+    pub height: usize,
+    /// L*, a* and b*.
+    pub lab: Vec<[f32; 3]>,
+    /// The same, smoothed a little.
+    pub smooth: Vec<[f32; 3]>,
+    /// Local standard deviation of L*.
+    pub deviation: Vec<f32>,
+    /// Of L*, a* and b* together.
+    pub gradient: Gradient,
+    /// Along x and y, of L* alone.
+    pub slope: (Vec<f32>, Vec<f32>),
+    /// A gradient that is an edge beyond doubt, above 0.
+    pub strong: f32,
+}
+
+impl Picture {
+    /// The photo with a longer side of at most `size` pixels.
+    pub fn of(photo: &Photo, size: u32) -> Picture {
+        let photo = photo.shrunk(size);
+        let (width, height) = (photo.width(), photo.height());
+        let lab = linear_to_labs(&photo.linear(width, height).rgb);
+        let channel = |c: usize| lab.iter().map(|p| p[c]).collect::<Vec<f32>>();
+        let [l, a, b] = [0, 1, 2].map(|c| smoothed(width, height, &channel(c), SMOOTHING));
+        let smooth = l.iter().zip(&a).zip(&b).map(|((l, a), b)| [*l, *a, *b]).collect();
+        let gradient = colour_gradient(width, height, &lab, 1.0);
+        let mut sorted = gradient.magnitude.clone();
+        sorted.sort_by(f32::total_cmp);
+        let strong = sorted.get((STRONG * sorted.len() as f64) as usize).map_or(1.0, |g| g.max(1.0));
+        Picture {
+            width: width as usize,
+            height: height as usize,
+            smooth,
+            deviation: deviation(width, height, &channel(0)),
+            slope: derivatives(width, height, &channel(0), 1.0),
+            gradient,
+            strong,
+            lab,
+        }
+    }
+
+    /// How many pixels there are.
+    pub fn pixels(&self) -> usize {
+        self.lab.len()
+    }
+}
+
+/// Local standard deviation of a channel.
+fn deviation(width: u32, height: u32, channel: &[f32]) -> Vec<f32> {
+    let mean = smoothed(width, height, channel, AROUND);
+    let squares: Vec<f32> = channel.iter().map(|v| v * v).collect();
+    let squares = smoothed(width, height, &squares, AROUND);
+    squares.iter().zip(&mean).map(|(s, m)| (s - m * m).max(0.0).sqrt()).collect()
+}

@@ -1,0 +1,236 @@
+//! A drawn vase is found, and the steps do what they say.
+
+use super::*;
+use image::{Rgb, RgbImage};
+
+const WIDTH: u32 = 240;
+const HEIGHT: u32 = 200;
+/// Where the middle of the drawn vase's axis is, and its length, pixels.
+const MIDDLE: [f64; 2] = [108.0, 97.0];
+const LENGTH: f64 = 120.0;
+
+/// A number in 0..1 that looks random.
+fn noise(i: u32) -> f64 {
+    let x = i.wrapping_mul(0x9e37_79b9) ^ (i >> 3);
+    let x = (x ^ x >> 15).wrapping_mul(0x85eb_ca6b);
+    f64::from((x ^ x >> 13) >> 8) / f64::from(1 << 24)
+}
+
+/// The half-width of the vase at a part of the way from foot to top.
+fn profile(t: f64) -> f64 {
+    22.0 + 14.0 * libm::sin(5.0 * t)
+}
+
+/// Where a pixel is along the vase, 0 at the foot and 1 at the top, and across its axis, which
+/// leans by an angle to the right.
+fn place(i: u32, j: u32, lean: f64) -> (f64, f64) {
+    let (x, y) = (f64::from(i) + 0.5 - MIDDLE[0], f64::from(j) + 0.5 - MIDDLE[1]);
+    let (s, c) = (libm::sin(lean), libm::cos(lean));
+    ((x * s - y * c) / LENGTH + 0.5, x * c + y * s)
+}
+
+/// A bright vase before a darker, speckled ground, and its mask.
+fn vase(lean: f64) -> (Photo, Mask) {
+    let inside = |i: u32, j: u32| {
+        let (t, across) = place(i, j, lean);
+        (0.0..=1.0).contains(&t) && across.abs() <= profile(t)
+    };
+    let picture = RgbImage::from_fn(WIDTH, HEIGHT, |i, j| {
+        let speckle = 30.0 * noise(j / 3 * 1000 + i / 3);
+        let light = place(i, j, lean).1;
+        let [r, g, b] = if inside(i, j) { [200.0 + light, 150.0 + light, 90.0] } else { [60.0, 75.0, 80.0] };
+        Rgb([r, g, b].map(|v| (v + speckle) as u8))
+    });
+    let mask = (0..HEIGHT).flat_map(|j| (0..WIDTH).map(move |i| (i, j))).map(|(i, j)| inside(i, j)).collect();
+    (Photo::from_rgb(picture).unwrap(), Mask::new(WIDTH, HEIGHT, mask).unwrap())
+}
+
+fn iou(a: &Mask, b: &Mask) -> f64 {
+    let pairs = || a.data().iter().zip(b.data());
+    pairs().filter(|(a, b)| **a && **b).count() as f64 / pairs().filter(|(a, b)| **a || **b).count() as f64
+}
+
+fn check_vase(lean: f64) {
+    let (photo, truth) = vase(lean);
+    let found = candidates(&photo, &CandidateOptions::default());
+    let first = found.first().expect("nothing was found");
+    let overlap = iou(&first.mask, &truth.resized(first.mask.width(), first.mask.height()));
+    assert!(overlap > 0.9, "{overlap}");
+    let axis = &first.axes[0];
+    assert!(axis.symmetry > 0.9, "{}", axis.symmetry);
+    let [x, y] = [0, 1].map(|c| axis.top[c] - axis.foot[c]);
+    let (s, c) = (libm::sin(lean), libm::cos(lean));
+    assert!((libm::atan2(x, -y) - lean).abs() < 3.0_f64.to_radians(), "leans by {}", libm::atan2(x, -y));
+    for (end, sign) in [(axis.foot, -0.5), (axis.top, 0.5)] {
+        let expected = [MIDDLE[0] + sign * LENGTH * s, MIDDLE[1] - sign * LENGTH * c];
+        let off = [end[0] - expected[0], end[1] - expected[1]];
+        assert!((off[0] * c + off[1] * s).abs() < 2.0, "{end:?} is beside the axis at {expected:?}");
+        assert!((off[0] * s - off[1] * c).abs() < 4.0, "{end:?} is not the end {expected:?}");
+    }
+    assert_eq!(axis.widths.len(), 24);
+    for (i, width) in axis.widths.iter().enumerate().skip(1).take(22) {
+        let expected = profile((i as f64 + 0.5) / 24.0);
+        assert!((width - expected).abs() < 3.0, "width {i} is {width}, not {expected}");
+    }
+    let second = &first.axes[1];
+    let [u, v] = [0, 1].map(|c| second.top[c] - second.foot[c]);
+    let cosine = (x * u + y * v).abs() / (libm::hypot(x, y) * libm::hypot(u, v));
+    assert!(cosine < libm::cos(29.0_f64.to_radians()) && second.symmetry < axis.symmetry);
+}
+
+#[test]
+fn a_vase_comes_first() {
+    check_vase(0.0);
+}
+
+#[test]
+fn a_leaning_vase_comes_first() {
+    check_vase(0.45);
+}
+
+#[test]
+fn the_same_photo_gives_the_same_list() {
+    let (photo, _) = vase(-0.2);
+    let all = candidates(&photo, &CandidateOptions { size: 96, most: 64 });
+    assert_eq!(all, candidates(&photo, &CandidateOptions { size: 96, most: 64 }));
+    assert!(all.windows(2).all(|w| w[0].score >= w[1].score));
+    assert!((5..=64).contains(&all.len()) && all.iter().all(|c| c.mask.width() == 96));
+    let three = candidates(&photo, &CandidateOptions { size: 96, most: 3 });
+    assert_eq!(three[0].mask, all[0].mask);
+    assert_eq!(three.len(), 3);
+    assert!(candidates(&photo, &CandidateOptions { size: 96, most: 0 }).is_empty());
+}
+
+/// What any list has to be, whatever the picture.
+fn check_list(photo: &Photo, options: &CandidateOptions) -> Vec<Candidate> {
+    let found = candidates(photo, options);
+    assert!(found.len() <= options.most);
+    for c in &found {
+        let longer = c.mask.width().max(c.mask.height());
+        assert!(longer <= options.size.clamp(16, 1024) && c.mask.data().contains(&true));
+        assert!(c.score > 0.0 && (1..=2).contains(&c.axes.len()));
+        for a in &c.axes {
+            assert!((0.0..=1.0).contains(&a.symmetry) && a.foot[1] >= a.top[1] - 1e-9);
+            assert!(a.foot.iter().chain(&a.top).all(|v| v.is_finite()));
+            assert!(a.widths.len() == 24 && a.widths.iter().all(|w| *w > 0.0 && w.is_finite()));
+        }
+    }
+    found
+}
+
+#[test]
+fn any_photo_gives_a_sane_list() {
+    let photo = |w, h, pixel: &dyn Fn(u32, u32) -> [u8; 3]| {
+        Photo::from_rgb(RgbImage::from_fn(w, h, |i, j| Rgb(pixel(i, j)))).unwrap()
+    };
+    let options = CandidateOptions::default();
+    let speckled = |i: u32, j: u32| [(255.0 * noise(i * 7919 + j)) as u8; 3];
+    for (w, h) in [(1, 1), (1, 2), (64, 48), (3, 200)] {
+        assert!(check_list(&photo(w, h, &|_, _| [90, 120, 40]), &options).is_empty(), "{w} x {h}");
+    }
+    for (w, h) in [(2, 2), (1, 300), (3000, 10), (10, 3000), (33, 17), (90, 90)] {
+        check_list(&photo(w, h, &speckled), &options);
+    }
+    for size in [0, 1, u32::MAX] {
+        check_list(&photo(40, 30, &speckled), &CandidateOptions { size, most: 5 });
+    }
+    // Two halves: all regions are cut off by the frame.
+    check_list(&photo(60, 40, &|i, _| if i < 30 { [0; 3] } else { [255; 3] }), &options);
+}
+
+/// Of rows of a drawing, `#` is on.
+fn area(rows: &[&str]) -> Area {
+    let on = rows.iter().flat_map(|r| r.bytes()).map(|b| b == b'#').collect();
+    Area::new(rows[0].len(), rows.len(), on).unwrap()
+}
+
+#[test]
+fn areas() {
+    let ring = area(&["......", ".####.", ".#..#.", ".####.", "......"]);
+    assert_eq!((ring.count, ring.bounds), (10, [1, 1, 5, 4]));
+    assert_eq!(ring.clone().filled(), area(&["......", ".####.", ".####.", ".####.", "......"]));
+    assert_eq!(ring.iou(&ring.clone().filled()), 10.0 / 12.0);
+    assert!(ring.overlaps(&ring.clone().filled(), 0.8) && !ring.overlaps(&ring.clone().filled(), 0.84));
+    let open = area(&["......", ".####.", ".#..#.", ".##.#.", "......"]);
+    assert_eq!(open.clone().filled(), open);
+    assert_eq!(open.union(&ring), Some(ring.clone()));
+    assert!(Area::new(2, 1, vec![false; 2]).is_none());
+    let dot = area(&["....", "....", ".#..", "...."]);
+    let dilated = area(&["....", "###.", "###.", "###."]);
+    assert_eq!(dot.dilated(1), dilated.on);
+    assert_eq!(dilated.outline(), (vec![4, 5, 6, 8, 10, 12, 13, 14], 5));
+    let two = area(&["##..#", "....#", ".#..#"]);
+    assert_eq!(area::largest(5, 3, &two.on), Some(area(&["....#", "....#", "....#"])));
+    let (of, sizes) = area::components(5, 3, |p| u32::from(two.on[p]));
+    assert_eq!((sizes, of[0], of[4], of[14]), (vec![2, 9, 3, 1], 0, 2, 2));
+}
+
+#[test]
+fn mirrors_of_a_leaning_ellipse() {
+    let lean: f64 = 0.6;
+    let inside = |i: usize, j: usize| {
+        let (x, y) = (i as f64 + 0.5 - 40.0, j as f64 + 0.5 - 31.0);
+        let (s, c) = (libm::sin(lean), libm::cos(lean));
+        let (along, across) = (x * s - y * c, x * c + y * s);
+        (along / 25.0).powi(2) + (across / 11.0).powi(2) <= 1.0
+    };
+    let area = Area::new(80, 60, (0..80 * 60).map(|p| inside(p % 80, p / 80)).collect()).unwrap();
+    let mirrors = mirror::mirrors(&area);
+    assert_eq!(mirrors.len(), 2);
+    let off = mirrors.iter().map(|m| (m.angle - lean).rem_euclid(std::f64::consts::FRAC_PI_2));
+    for off in off {
+        assert!(off.min(std::f64::consts::FRAC_PI_2 - off) < 0.03, "{off}");
+    }
+    assert!(mirrors.iter().all(|m| m.symmetry > 0.95 && m.offset.abs() < 0.3));
+    assert!(mirror::symmetry(&area) > 0.93);
+    // Half of it is one but for the long axis.
+    let half = |p: usize| inside(p % 80, p / 80) && p % 80 < 40;
+    let half = Area::new(80, 60, (0..80 * 60).map(half).collect()).unwrap();
+    assert!(mirror::symmetry(&half) < 0.9);
+}
+
+#[test]
+fn segments_and_regions_of_plain_colours() {
+    // A square of two colours before a third.
+    let colour = |i: u32, j: u32| match (i, j) {
+        (20..32, 20..44) => [200, 60, 50],
+        (32..44, 20..44) => [220, 90, 50],
+        _ => [40, 60, 160],
+    };
+    let photo = Photo::from_rgb(RgbImage::from_fn(64, 64, |i, j| Rgb(colour(i, j)))).unwrap();
+    let picture = Picture::of(&photo, 64);
+    let segments = felzenszwalb(&Edges::of(&picture), 20.0, 25);
+    let at = |i: usize, j: usize| segments.0[j * 64 + i];
+    assert!(at(24, 30) != at(40, 30) && at(24, 30) != at(5, 5));
+    assert!(at(24, 21) == at(24, 42) && at(5, 5) == at(60, 60));
+    assert!((3..12).contains(&segments.1), "{} segments", segments.1);
+    let whole = |p: usize| (20..44).contains(&(p % 64)) && (20..44).contains(&(p / 64));
+    let whole = Area::new(64, 64, (0..64 * 64).map(whole).collect()).unwrap();
+    let best = |all: &[Area]| all.iter().map(|a| a.iou(&whole)).fold(0.0, f64::max);
+    for rule in [Rule::Likeness, Rule::Edges] {
+        let all = merge(&picture, &segments, rule, 16, 3000);
+        assert!(best(&all) > 0.85, "{}", best(&all));
+        assert!(all.iter().all(|a| (16..=3000).contains(&a.count)));
+    }
+    assert!(best(&clusters::regions(&picture, 16)) > 0.9);
+}
+
+#[test]
+fn a_cut_moves_to_the_object() {
+    let (photo, truth) = vase(0.1);
+    let picture = Picture::of(&photo, 128);
+    let truth = truth.resized(picture.width as u32, picture.height as u32);
+    let truth = Area::new(picture.width, picture.height, truth.data().to_vec()).unwrap();
+    // Its shape, a little beside it.
+    let seed = |p: usize| p % picture.width >= 2 && truth.on[p - 2];
+    let seed = Area::new(picture.width, picture.height, (0..picture.pixels()).map(seed).collect()).unwrap();
+    let field = Field::new(&picture, clusters::codebook(&picture));
+    let cut = field.cut(&seed).unwrap();
+    let (before, after) = (seed.iou(&truth), cut.iou(&truth));
+    assert!(after > 0.94 && before < 0.88, "{after} from {before}");
+    let judge = Judge::new(&picture, &field.letters);
+    assert!(judge.score(&truth) > judge.score(&seed));
+    let twice = suppressed(vec![(0.2, cut.clone()), (0.3, truth.clone()), (0.0, seed)], 0.99, 9);
+    assert_eq!(twice.iter().map(|(s, _)| *s).collect::<Vec<_>>(), [0.3, 0.2]);
+    assert_eq!(suppressed(vec![(0.2, truth.clone()), (0.3, truth)], OVERLAP, 9).len(), 1);
+}
