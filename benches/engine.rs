@@ -155,6 +155,7 @@ fn likelihood(c: &mut Criterion) {
     // A pose that can be set by itself, and a size, which makes a new profile.
     let text = include_str!("../programs/lathe.pcad");
     let model = Program::parse(text)
+        .map(|p| p.set("size", "128"))
         .and_then(|p| p.observe_file("photo", photograph))
         .and_then(Program::compile)
         .unwrap_or_else(|e| panic!("{e}"));
