@@ -155,6 +155,16 @@ fn a_search_for_modes_ends_when_time_is_up() {
     assert!((x - 200.0 / 101.0).abs() < 1.0, "{x}");
 }
 
+/// All the time there is, as libraries say it, is no overflow.
+#[test]
+fn a_run_may_have_all_the_time_there_is() {
+    let text = "assume x ~ normal(0, 1); observe normal(x, 1) = 0;
+        infer { warmup 1 { modes(@x, tries = 8); } repeat 5000 { mh(@x); collect x; } }";
+    let model = Model::from_text(text).unwrap_or_else(|e| panic!("{e}"));
+    let options = RunOptions { time: Some(Duration::MAX), steps: Some(5000), ..RunOptions::default() };
+    assert_eq!(model.run(&options, 1, 1).unwrap_or_else(|e| panic!("{e}")).chains[0].steps, 5000);
+}
+
 /// What may draw a picture counts as many operations: it is given up sooner.
 #[test]
 fn observations_that_may_be_slow_are_stopped_sooner() {

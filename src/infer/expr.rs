@@ -2,7 +2,7 @@
 //! names, and what is known of the run.
 
 use super::selection::{fail, fault};
-use crate::lang::builtins::{Args, Kind};
+use crate::lang::builtins::{Args, Builtin, Kind};
 use crate::lang::code::{Code, Operand};
 use crate::lang::error::RunError;
 use crate::lang::index::index_value;
@@ -95,15 +95,12 @@ pub(crate) fn evaluate(e: &Expr, env: &mut Scope) -> Result<Value, Box<RunError>
             }
             let values: Result<Vec<Value>, _> = args.iter().map(|a| evaluate(&a.value, env)).collect();
             let values = values?;
-            let builtins = &env.code.builtins;
-            let Some(called) = builtins.find("", name).map(|i| builtins.get(i)) else {
-                return builtin(name, &[], e, env);
-            };
+            let called = known(name, e, env)?;
             // As many as it has, those left out as nothing: keywords may change the order.
             let order = called.match_names(args.iter().map(|a| a.name.as_ref().map(|n| &*n.node)));
             let order = order.map_err(|message| fail(e.span, message))?;
             let placed: Vec<&Value> = order.iter().map(|i| i.map_or(&Value::Unit, |i| &values[i])).collect();
-            builtin(name, &placed, e, env)
+            apply(called, &placed, e)
         }
         ExprKind::If { cond, then, otherwise } => {
             let taken = match evaluate(cond, env)? {
@@ -134,17 +131,24 @@ fn variable(name: &Arc<str>, e: &Expr, env: &mut Scope) -> Result<Value, Box<Run
 }
 
 fn builtin(name: &str, values: &[&Value], e: &Expr, env: &Scope) -> Result<Value, Box<RunError>> {
-    let found = env.code.builtins.find("", name).map(|i| env.code.builtins.get(i));
-    match found {
-        Some(b) => match b.kind {
-            Kind::Function(f) => f(&Args { builtin: b, values }).map_err(|f| fault(e.span, f)),
-            Kind::Distribution(_) => match b.distribution(values) {
-                Ok(d) => Ok(Value::Dist(Arc::new(d))),
-                Err(f) => Err(Box::new(RunError { kind: f.kind, ..*fault(e.span, f) })),
-            },
-            _ => Err(fail(e.span, format!("`{name}` is not available in this place"))),
+    apply(known(name, e, env)?, values, e)
+}
+
+/// A builtin by its name.
+fn known<'a>(name: &str, e: &Expr, env: &'a Scope) -> Result<&'a Builtin, Box<RunError>> {
+    let builtins = &env.code.builtins;
+    let found = builtins.find("", name).map(|i| builtins.get(i));
+    found.ok_or_else(|| fail(e.span, format!("`{name}` is not known here")))
+}
+
+fn apply(b: &Builtin, values: &[&Value], e: &Expr) -> Result<Value, Box<RunError>> {
+    match b.kind {
+        Kind::Function(f) => f(&Args { builtin: b, values }).map_err(|f| fault(e.span, f)),
+        Kind::Distribution(_) => match b.distribution(values) {
+            Ok(d) => Ok(Value::Dist(Arc::new(d))),
+            Err(f) => Err(Box::new(RunError { kind: f.kind, ..*fault(e.span, f) })),
         },
-        None => Err(fail(e.span, format!("`{name}` is not known here"))),
+        _ => Err(fail(e.span, format!("`{}` is not available in this place", b.name))),
     }
 }
 

@@ -117,7 +117,7 @@ impl Stop {
 
     /// Whether it has been asked for, or this share of the time has gone by.
     pub fn has_used(&self, share: f64) -> bool {
-        self.is_set() || self.time.is_some_and(|(from, t)| from.elapsed() >= t.mul_f64(share))
+        self.is_set() || self.time.is_some_and(|(from, t)| from.elapsed().as_secs_f64() >= share * t.as_secs_f64())
     }
 }
 
