@@ -67,6 +67,42 @@ fn maps_of_the_program_are_paid_for() {
     assert_mean("c by maps", &d["c"], yes / (yes + no), 0.03);
 }
 
+/// Choices that are proposed beside a map, a whitened vector among them, against the exact posterior of a linear model.
+#[test]
+fn proposals_beside_a_map_are_paid_for() {
+    let d = run(
+        "assume s ~ normal(0, 1); assume f ~ gp(mean = 0, cov = sq_exp(1, 1), at = [0, 1]) #f;
+         observe normal(s + f[0], 0.5) = 2; observe normal(s - f[1], 0.5) = 0.3;
+         kernel swapped() {
+           propose u ~ normal(0, 0.8);
+           propose @s = value(@s) + u;
+           propose @f ~ mv_normal(0.5 * value(@f) - u, cov = 0.3 * identity(2));
+           propose u = -u;
+         }
+         infer { warmup 1000 { swapped(); } repeat 60000 { swapped(); collect s, f; } }",
+        1,
+        2,
+    );
+    // Prior covariance of (s, f0, f1), and two linear observations of it.
+    let c = (-0.5f64).exp();
+    let k = [[1.0, 0.0, 0.0], [0.0, 1.0, c], [0.0, c, 1.0]];
+    let (h, y) = ([[1.0, 1.0, 0.0], [1.0, 0.0, -1.0]], [2.0, 0.3]);
+    let kh = |i: usize, o: usize| (0..3).map(|j| k[i][j] * h[o][j]).sum::<f64>();
+    let g = |o: usize, p: usize| (0..3).map(|i| h[o][i] * kh(i, p)).sum::<f64>() + if o == p { 0.25 } else { 0.0 };
+    let det = g(0, 0) * g(1, 1) - g(0, 1) * g(1, 0);
+    let w = [(g(1, 1) * y[0] - g(0, 1) * y[1]) / det, (g(0, 0) * y[1] - g(1, 0) * y[0]) / det];
+    for (i, name) in ["s", "f[0]", "f[1]"].iter().enumerate() {
+        assert_mean(name, &d[*name], kh(i, 0) * w[0] + kh(i, 1) * w[1], 0.06);
+    }
+    let v = |i: usize| {
+        let [a, b] = [kh(i, 0), kh(i, 1)];
+        k[i][i] - (a * a * g(1, 1) - 2.0 * a * b * g(0, 1) + b * b * g(0, 0)) / det
+    };
+    let mean = kh(0, 0) * w[0] + kh(0, 1) * w[1];
+    let squares: Vec<f64> = d["s"].iter().map(|x| (x - mean) * (x - mean)).collect();
+    assert_mean("variance of s", &squares, v(0), 0.06);
+}
+
 /// A map that does not lead back, or whose derivatives cannot be known, ends the run with the reason.
 #[test]
 fn maps_that_are_no_involutions_are_caught() {
@@ -78,7 +114,8 @@ fn maps_that_are_no_involutions_are_caught() {
         ),
         ("propose @x = 1;", "applied twice, it takes @x from"),
         ("propose u ~ normal(0, 1); propose @x = twice - value(@x);", "reads choices and constants alone"),
-        ("propose @x ~ normal(0, 1); propose @x = 1;", "draws auxiliary variables only"),
+        ("propose @x ~ normal(0, 1); propose @x = 1;", "given a new value twice"),
+        ("propose @x = -value(@x); propose @x ~ normal(0, 1);", "proposed twice"),
     ];
     for (body, expected) in wrong {
         let text = format!(

@@ -1,10 +1,11 @@
 //! A population of states that shrinks to one while the likelihood is annealed.
 //!
 //! Far from the posterior a single annealed chain ends in whichever mode drew it first. A population explores several: its
-//! members move in turn under the same kernels, and as the power of the likelihood rises from b to b', each gets offspring in
-//! proportion to likelihood^(b' - b), as in population annealing (Hukushima & Iba 2003) and sequential Monte Carlo samplers
-//! (Del Moral, Doucet & Jasra 2006). The number falls geometrically as the power rises, so that those who are left get more of
-//! the time. It belongs to warm-up: the states it goes through are not draws.
+//! members move in turn under the same kernels, and as the power of the likelihood rises from b to b', each gains a weight of
+//! likelihood^(b' - b), as in population annealing (Hukushima & Iba 2003) and sequential Monte Carlo samplers (Del Moral, Doucet &
+//! Jasra 2006). The number falls geometrically as the power rises, so that those who are left get more of the time; offspring are
+//! drawn by weight when a third of the members has to go, and not before: after few steps likelihoods say more of how a member
+//! began than of where it is going. It belongs to warm-up: the states it goes through are not draws.
 
 use super::resampling::systematic;
 use crate::rng::Stream;
@@ -16,10 +17,13 @@ const LEG: u64 = 16;
 
 type State = Vec<(u64, Constraint)>;
 
-/// States and their log-likelihoods; the chain's trace is in the one whose turn it is.
+/// A state, its log-likelihood, and the log of the weight it has gained since offspring were drawn.
+type Member = (State, f64, f64);
+
+/// Some members; the chain's trace is in the one whose turn it is.
 #[derive(Clone, Debug, PartialEq, Serialize, Deserialize)]
 pub(crate) struct Population {
-    members: Vec<(State, f64)>,
+    members: Vec<Member>,
     first: usize,
     turn: usize,
     steps: u64,
@@ -31,7 +35,7 @@ impl Population {
     pub fn new(traces: &[Trace]) -> Self {
         let members: Vec<_> = match traces {
             [_] => Vec::new(),
-            _ => traces.iter().map(|t| (t.constraints(), t.log_likelihood())).collect(),
+            _ => traces.iter().map(|t| (t.constraints(), t.log_likelihood(), 0.0)).collect(),
         };
         Population { first: members.len(), members, turn: 0, steps: 0, power: None }
     }
@@ -62,12 +66,15 @@ impl Population {
         if !self.steps.is_multiple_of(LEG) {
             return Ok(present);
         }
-        self.members[self.turn] = (trace.constraints(), trace.log_likelihood());
+        self.keep(trace);
         self.turn += 1;
         if self.turn == self.members.len() {
             self.turn = 0;
+            self.weigh(power - present);
             let left = libm::round(libm::pow(self.first as f64, 1.0 - share)) as usize;
-            self.resample(power - present, left.clamp(1, self.members.len()), rng);
+            if 3 * left <= 2 * self.members.len() {
+                self.resample(left.max(1), rng);
+            }
             self.power = Some(power);
         }
         trace.restore(&self.members[self.turn].0, draws)?;
@@ -80,24 +87,38 @@ impl Population {
     /// Those of the program.
     pub fn finish(&mut self, trace: &mut Trace, draws: Draws, rng: &mut Stream) -> TraceResult<()> {
         if self.members.len() > 1 {
-            self.members[self.turn] = (trace.constraints(), trace.log_likelihood());
-            self.resample(1.0 - self.power.unwrap_or(0.0), 1, rng);
+            self.keep(trace);
+            self.weigh(1.0 - self.power.unwrap_or(0.0));
+            self.resample(1, rng);
             trace.restore(&self.members[0].0, draws)?;
         }
         self.members.clear();
         Ok(())
     }
 
-    /// Thins the members out to so many, by what the likelihood gains.
-    fn resample(&mut self, step: f64, left: usize, rng: &mut Stream) {
-        // Nobody dies at an equal power, though 0 times infinity is NaN.
-        let gain = |m: &(State, f64)| if step == 0.0 { 0.0 } else { step * m.1 };
-        let top = self.members.iter().map(gain).fold(f64::NEG_INFINITY, f64::max);
+    /// The state of the chain, as that of the member whose turn it is.
+    fn keep(&mut self, trace: &Trace) {
+        let member = &mut self.members[self.turn];
+        (member.0, member.1) = (trace.constraints(), trace.log_likelihood());
+    }
+
+    /// What members gain when the power of the likelihood rises by so much.
+    fn weigh(&mut self, step: f64) {
+        // Nobody gains at an equal power, though 0 times infinity is NaN.
+        if step != 0.0 {
+            self.members.iter_mut().for_each(|m| m.2 += step * m.1);
+        }
+    }
+
+    /// Draws so many offspring by weight.
+    fn resample(&mut self, left: usize, rng: &mut Stream) {
+        let top = self.members.iter().map(|m| m.2).fold(f64::NEG_INFINITY, f64::max);
         let weights: Vec<f64> = match top {
             f64::NEG_INFINITY => vec![1.0; self.members.len()],
-            _ => self.members.iter().map(|m| libm::exp(gain(m) - top)).collect(),
+            _ => self.members.iter().map(|m| libm::exp(m.2 - top)).collect(),
         };
-        self.members = systematic(&weights, left, rng).into_iter().map(|i| self.members[i].clone()).collect();
+        let offspring = |i: usize| (self.members[i].0.clone(), self.members[i].1, 0.0);
+        self.members = systematic(&weights, left, rng).into_iter().map(offspring).collect();
     }
 }
 
@@ -109,12 +130,12 @@ mod tests {
 
     fn population(log_likelihoods: &[f64]) -> Population {
         let state = |i: usize| vec![(i as u64, Constraint::Stored(crate::dist::Datum::Num(0.0)))];
-        let members: Vec<_> = log_likelihoods.iter().enumerate().map(|(i, l)| (state(i), *l)).collect();
+        let members: Vec<_> = log_likelihoods.iter().enumerate().map(|(i, l)| (state(i), *l, 0.0)).collect();
         Population { first: members.len(), members, turn: 0, steps: 0, power: None }
     }
 
     fn offspring(p: &Population, of: u64) -> usize {
-        p.members.iter().filter(|(s, _)| s[0].0 == of).count()
+        p.members.iter().filter(|m| m.0[0].0 == of).count()
     }
 
     #[test]
@@ -122,11 +143,14 @@ mod tests {
         for seed in 0..200 {
             let mut rng = StreamKey::new(seed, 0, Purpose::POPULATION).stream(0, 0, 0);
             let mut p = population(&[0.0, libm::log(6.0), libm::log(3.0), f64::NEG_INFINITY]);
-            p.resample(1.0, 10, &mut rng);
+            p.weigh(0.25);
+            p.weigh(0.75);
+            p.resample(10, &mut rng);
             assert_eq!([0, 1, 2, 3].map(|i| offspring(&p, i)), [1, 6, 3, 0]);
             // At an equal power everyone has the same chance, and the number may fall.
             let mut p = population(&[-1e300, 5.0, 700.0, 0.0]);
-            p.resample(0.0, 2, &mut rng);
+            p.weigh(0.0);
+            p.resample(2, &mut rng);
             assert_eq!(p.members.len(), 2);
             assert!((0..4).all(|i| offspring(&p, i) <= 1));
         }
@@ -136,8 +160,27 @@ mod tests {
     fn impossible_members_leave_no_trace_of_nan() {
         let mut rng = StreamKey::new(1, 0, Purpose::POPULATION).stream(0, 0, 0);
         let mut p = population(&[f64::NEG_INFINITY, f64::NEG_INFINITY]);
-        p.resample(0.5, 2, &mut rng);
+        p.weigh(0.5);
+        p.resample(2, &mut rng);
         assert_eq!(p.members.len(), 2);
+    }
+
+    /// Twelve members thin out to eight, five, three, two and one as the power rises, not one by one.
+    #[test]
+    fn members_go_by_thirds() {
+        let model = Model::from_text("assume x ~ normal(0, 1); observe normal(x, 1) = 0;").unwrap();
+        let begun: Vec<Trace> = (0..12).map(|i| model.simulate(1, i).unwrap()).collect();
+        let mut rng = StreamKey::new(1, 0, Purpose::POPULATION).stream(0, 0, 0);
+        let (mut trace, mut p) = (begun[0].clone(), Population::new(&begun));
+        let mut sizes = vec![12];
+        for step in 0..=10_000 {
+            let share = f64::from(step) / 10_000.0;
+            p.advance(&mut trace, (share, share), Draws::default(), &mut rng).unwrap();
+            if sizes.last() != Some(&p.members.len()) {
+                sizes.push(p.members.len());
+            }
+        }
+        assert_eq!(sizes, [12, 8, 5, 3, 2, 1]);
     }
 
     #[test]

@@ -8,7 +8,7 @@ use super::marks::Marks;
 use super::place::Extent;
 use super::project::Vertices;
 use super::raster::{Area, Wanted};
-use super::triangle::{Plane, is_flat, keep_all};
+use super::triangle::{Plane, is_flat, keep_all, put_face};
 use crate::geom::{Patches, Topology};
 use glam::Vec4;
 
@@ -76,54 +76,73 @@ impl Candidates {
         self.count += usize::from(counts);
     }
 
-    /// Keeps the nearer of a mesh's triangles and what is there, in the rows of an area.
+    /// Keeps the nearer of a mesh's triangles and what is there, in the rows of an area. With `FACES`, `seen` gets the face of each
+    /// pixel where a triangle was nearer, and everything is wanted.
     #[inline(always)]
-    pub fn fill(
+    pub fn fill<const FACES: bool>(
         &mut self,
         topology: &Topology,
         vertices: &Vertices<'_>,
         (size, back): (Vec4, f64),
-        area: &Area,
-        wanted: Wanted<'_>,
+        (area, wanted): (&Area, Wanted<'_>),
         buffer: &mut [f32],
+        seen: &mut [u32],
     ) {
         let marks = wanted.marks();
         self.find(topology, vertices, size, back, marks);
         let width = area.right - area.left;
-        let large = |face: u32, extent: Extent, buffer: &mut [f32]| {
-            if let Some(triangle) = vertices.triangle(topology, face, extent, back) {
-                triangle.keep(buffer, area, marks);
-            }
+        let large = |face: u32, extent: Extent, buffer: &mut [f32], seen: &mut [u32]| match vertices
+            .triangle(topology, face, extent, back)
+        {
+            Some(triangle) if FACES => triangle.fill_faces(buffer, (seen, face), area),
+            Some(triangle) => triangle.keep(buffer, area, marks),
+            None => {}
         };
         let Candidates { faces, extents, count, batch } = self;
         let list = faces[..*count].iter().copied().zip(extents[..*count].iter().copied());
         if width < LANES {
-            return list.for_each(|(face, extent)| large(face, extent, buffer));
+            return list.for_each(|(face, extent)| large(face, extent, buffer, seen));
         }
         let places = |face: u32| vertices.places(topology.triangles.get(face as usize)?);
         let back = back as i32;
-        batch.each(list, places, area.right, back, |batch, i, face, extent, kind| {
-            if kind == Kind::Large {
-                return large(face, *extent, buffer);
-            }
-            let (mut plane, mut flat) = (None, None);
-            batch.rows(i, extent, area.right, |row, from, outside| {
-                let at = (row - area.top) * width + from - area.left;
-                if marks.is_some_and(|marks| marks.window(at, LANES) as u32 & !outside.to_bitmask() == 0) {
-                    return;
+        batch.each(
+            list,
+            places,
+            area.right,
+            back,
+            #[inline(always)]
+            |batch, i, face, extent, kind| {
+                if kind == Kind::Large {
+                    return large(face, *extent, buffer, seen);
                 }
-                if let Some(least) = wanted.least(at) {
-                    // A triangle without area covers nothing, whatever its rounded corners say.
-                    if *flat.get_or_insert_with(|| is_flat(&vertices.corners(topology, face))) {
-                        return;
-                    }
-                    return keep_all(buffer, at, least, outside);
-                }
-                let corners = || Plane::new(&vertices.corners(topology, face), extent.ends()[0][0]);
-                if let Some(plane) = plane.get_or_insert_with(corners) {
-                    plane.keep(buffer, at, row, from, outside);
-                }
-            });
-        });
+                let (mut plane, mut flat) = (None, None);
+                batch.rows(
+                    i,
+                    extent,
+                    area.right,
+                    #[inline(always)]
+                    |row, from, outside| {
+                        let at = (row - area.top) * width + from - area.left;
+                        if marks.is_some_and(|marks| marks.window(at, LANES) as u32 & !outside.to_bitmask() == 0) {
+                            return;
+                        }
+                        if let Some(least) = wanted.least(at) {
+                            // A triangle without area covers nothing, whatever its rounded corners say.
+                            if *flat.get_or_insert_with(|| is_flat(&vertices.corners(topology, face))) {
+                                return;
+                            }
+                            return keep_all(buffer, at, least, outside);
+                        }
+                        let corners = || Plane::new(&vertices.corners(topology, face), extent.ends()[0][0]);
+                        if let Some(plane) = plane.get_or_insert_with(corners) {
+                            let nearer = plane.keep(buffer, at, row, from, outside);
+                            if FACES {
+                                put_face(seen, at, face, nearer);
+                            }
+                        }
+                    },
+                );
+            },
+        );
     }
 }

@@ -4,11 +4,12 @@
 //! finite exactly where something is seen; the other channels have as many entries or, when not asked for, none.
 
 use super::candidates::Candidates;
-use super::project::{Lens, Projected, project};
-use super::raster::{draw_nearness, each_triangle, empty};
+use super::project::{Lens, Placement, Point, Projected, project};
+use super::raster::{Area, WHOLE, cut_triangles, draw_nearness, empty, fill_faces};
 use super::simd::vectorised;
+use super::triangle::area;
 use super::{Camera, work};
-use crate::geom::Solid;
+use crate::geom::{Mesh, Solid};
 use glam::{DVec3, Vec3};
 use std::cell::RefCell;
 
@@ -38,8 +39,8 @@ pub struct Frame {
 }
 
 thread_local! {
-    /// Projected vertices and what may be drawn, reused from frame to frame.
-    static SCRATCH: RefCell<(Projected, Candidates)> = RefCell::default();
+    /// Projected vertices, what may be drawn and how it is shaded, reused from frame to frame.
+    static SCRATCH: RefCell<(Projected, Candidates, Shading)> = RefCell::default();
 }
 
 impl Frame {
@@ -60,7 +61,7 @@ impl Frame {
         solid: &Solid,
         camera: &Camera,
         channels: Channels,
-        (projected, candidates): &mut (Projected, Candidates),
+        (projected, candidates, shading): &mut (Projected, Candidates, Shading),
     ) -> Frame {
         work::count(|work| work.whole += 1);
         solid.instances().iter().for_each(|i| work::drawn(&i.mesh));
@@ -75,7 +76,8 @@ impl Frame {
                 depth.resize(camera.pixels(), empty(camera));
                 part.resize(camera.pixels(), u16::MAX);
                 normal.resize(camera.pixels(), [0.0; 3]);
-                draw_all(solid, camera, projected, &mut depth, &mut part, &mut normal);
+                let scratch = (&*projected, candidates, shading);
+                draw_all(solid, camera, scratch, &mut depth, &mut part, &mut normal);
             }
         }
         to_depth(camera, &mut depth);
@@ -102,59 +104,149 @@ pub(super) fn to_depth(camera: &Camera, buffer: &mut [f32]) {
     );
 }
 
+/// Nearness, parts and normals of all meshes. The nearest face of each pixel comes first, its normal after that and once.
 fn draw_all(
     solid: &Solid,
     camera: &Camera,
-    projected: &Projected,
+    (projected, candidates, shading): (&Projected, &mut Candidates, &mut Shading),
     nearness: &mut [f32],
     part: &mut [u16],
     normal: &mut [[f32; 3]],
 ) {
-    let width = camera.width as usize;
-    let lens = Lens::new(camera);
+    let (width, lens) = (camera.width as usize, Lens::new(camera));
     let (bend, cx, cy) = (if lens.pinhole { 1.0 / lens.scale } else { 0.0 }, lens.cx, lens.cy);
-    each_triangle(solid, camera, projected, |triangle, source| {
-        let Some(instance) = solid.instances().get(source.instance) else { return };
-        let mesh = &instance.mesh;
-        let number = mesh.topology.parts.get(source.face).map_or(0, |p| p.saturating_add(instance.first_part));
-        let number = number.min(u16::MAX - 1);
-        // Counter-clockwise in the scene is a negative area in the image, whose y runs down.
-        let turn = if (triangle.area < 0.0) != source.placement.mirrored { 1.0 } else { -1.0 };
-        let corner = |v: u32| {
-            let n = mesh.normals.get(v as usize).map_or(DVec3::ZERO, |n| n.as_dvec3());
-            source.placement.normal(n).normalize_or_zero() * turn
+    // The normal at a pixel's centre, from its slope over the triangle.
+    let shade = |slope: &Slope, row: usize, column: usize| {
+        let (x, y) = (column as f64 + 0.5, row as f64 + 0.5);
+        let to_eye = DVec3::new((cx - x) * bend, (y - cy) * bend, 1.0).as_vec3();
+        seen_normal(slope.at(x, y).as_vec3(), to_eye)
+    };
+    for (i, instance) in solid.instances().iter().enumerate() {
+        let (mesh, placement) = (&instance.mesh, &Placement::new(camera, &instance.affine));
+        let number = |face: usize| {
+            let own = mesh.topology.parts.get(face).map_or(0, |p| p.saturating_add(instance.first_part));
+            own.min(u16::MAX - 1)
         };
-        let corners = mesh.topology.triangles[source.face].map(corner);
-        let [a, b, c] = triangle.points;
-        let weight = |p: &super::project::Point| if lens.pinhole { p.nearness } else { 1.0 };
-        let at = |i: usize| {
-            let w = source.weights[i];
-            (corners[0] * w[0] + corners[1] * w[1] + corners[2] * w[2]) * weight(&triangle.points[i])
-        };
-        let (na, nb, nc) = (at(0), at(1), at(2));
-        let inverse = 1.0 / triangle.area;
-        let (nb, nc) = (nb - na, nc - na);
-        let dx = (nb * (c.y - a.y) - nc * (b.y - a.y)) * inverse;
-        let dy = (nc * (b.x - a.x) - nb * (c.x - a.x)) * inverse;
-        triangle.runs(|run| {
-            let y = run.row as f64 + 0.5;
-            let row_start = na + dy * (y - a.y);
-            for column in run.from..run.to {
-                let i = run.row * width + column;
-                let q = run.nearness(column);
-                if let (Some(at), Some(part), Some(normal)) = (nearness.get_mut(i), part.get_mut(i), normal.get_mut(i))
-                    && q > *at
-                {
-                    *at = q;
-                    *part = number;
-                    let x = column as f64 + 0.5;
-                    let n = (row_start + dx * (x - a.x)).as_vec3();
-                    let to_eye = DVec3::new((cx - x) * bend, (y - cy) * bend, 1.0).as_vec3();
-                    *normal = seen_normal(n, to_eye);
+        let vertices = projected.mesh(i);
+        if vertices.outside(camera) {
+            continue;
+        }
+        if !vertices.whole {
+            cut_triangles(mesh, placement, camera, &vertices, |triangle, face, weights| {
+                let slope = Slope::new(mesh, placement, lens.pinhole, face, &triangle.points, weights);
+                let number = number(face);
+                triangle.runs(|run| {
+                    for column in run.from..run.to {
+                        let (i, q) = (run.row * width + column, run.nearness(column));
+                        if q > nearness[i] {
+                            (nearness[i], part[i], normal[i]) = (q, number, shade(&slope, run.row, column));
+                        }
+                    }
+                });
+            });
+            continue;
+        }
+        let area = Area::around(&vertices, camera);
+        shading.begin(camera.pixels(), mesh.topology.triangles.len(), width, &area);
+        fill_faces(mesh, placement, camera, &vertices, candidates, nearness, &mut shading.faces);
+        for row in area.top..area.bottom {
+            for column in area.left..area.right {
+                let i = row * width + column;
+                let face = shading.faces[i];
+                if face != NOWHERE {
+                    let slope = shading.slope(face, |face| {
+                        let points = vertices.corners(&mesh.topology, face);
+                        Slope::new(mesh, placement, lens.pinhole, face as usize, &points, WHOLE)
+                    });
+                    (part[i], normal[i]) = (number(face as usize), shade(slope, row, column));
                 }
             }
-        });
-    });
+        }
+    }
+}
+
+/// No face.
+const NOWHERE: u32 = u32::MAX;
+
+/// The nearest faces of one mesh, and how normals change over them. Reused from mesh to mesh.
+#[derive(Default)]
+struct Shading {
+    /// The face of each pixel, where the mesh is nearest.
+    faces: Vec<u32>,
+    /// Where the slope of each face is, if it is known.
+    known: Vec<u32>,
+    slopes: Vec<Slope>,
+}
+
+impl Shading {
+    /// Forgets what was seen in an area, which no later mesh may look beyond, and all slopes.
+    fn begin(&mut self, pixels: usize, faces: usize, width: usize, area: &Area) {
+        self.faces.resize(pixels, NOWHERE);
+        for row in self.faces.chunks_exact_mut(width).take(area.bottom).skip(area.top) {
+            row[area.left..area.right].fill(NOWHERE);
+        }
+        self.known.clear();
+        self.known.resize(faces, NOWHERE);
+        self.slopes.clear();
+    }
+
+    /// The slope of a face, worked out the first time it is asked for.
+    #[inline]
+    fn slope(&mut self, face: u32, new: impl Fn(u32) -> Slope) -> &Slope {
+        let known = &mut self.known[face as usize];
+        if *known == NOWHERE {
+            *known = self.slopes.len() as u32;
+            self.slopes.push(new(face));
+        }
+        &self.slopes[*known as usize]
+    }
+}
+
+/// A normal that changes linearly over a triangle in the image, not of unit length.
+struct Slope {
+    first: DVec3,
+    by_column: DVec3,
+    by_row: DVec3,
+    corner: [f64; 2],
+}
+
+impl Slope {
+    /// Of a triangle with corners at some points, which are weighted means of the face's.
+    fn new(
+        mesh: &Mesh,
+        placement: &Placement,
+        pinhole: bool,
+        face: usize,
+        points: &[Point; 3],
+        weights: [[f64; 3]; 3],
+    ) -> Slope {
+        let area = area(points);
+        // Counter-clockwise in the scene is a negative area in the image, whose y runs down.
+        let turn = if (area < 0.0) != placement.mirrored { 1.0 } else { -1.0 };
+        let corner = |v: u32| {
+            let n = mesh.normals.get(v as usize).map_or(DVec3::ZERO, |n| n.as_dvec3());
+            placement.normal(n).normalize_or_zero() * turn
+        };
+        let corners = mesh.topology.triangles.get(face).copied().unwrap_or_default().map(corner);
+        let weight = |p: &Point| if pinhole { p.nearness } else { 1.0 };
+        let at = |i: usize| {
+            let w = weights[i];
+            (corners[0] * w[0] + corners[1] * w[1] + corners[2] * w[2]) * weight(&points[i])
+        };
+        let [a, b, c] = points;
+        let (na, nb, nc) = (at(0), at(1), at(2));
+        let inverse = 1.0 / area;
+        let (nb, nc) = (nb - na, nc - na);
+        let by_column = (nb * (c.y - a.y) - nc * (b.y - a.y)) * inverse;
+        let by_row = (nc * (b.x - a.x) - nb * (c.x - a.x)) * inverse;
+        Slope { first: na, by_column, by_row, corner: [a.x, a.y] }
+    }
+
+    /// At a place in the image.
+    #[inline(always)]
+    fn at(&self, x: f64, y: f64) -> DVec3 {
+        self.first + self.by_row * (y - self.corner[1]) + self.by_column * (x - self.corner[0])
+    }
 }
 
 /// A unit normal that does not point away from the eye: interpolated normals can lean a little beyond the outline,

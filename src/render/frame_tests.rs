@@ -3,6 +3,7 @@
 use super::*;
 use crate::geom::{Affine, Mesh};
 use crate::render::Projection;
+use crate::render::raster::each_triangle;
 use crate::render::testing::{Uniform, cases, cuboid, lathe, solid, sphere};
 use std::sync::Arc;
 
@@ -288,4 +289,77 @@ fn a_body_without_its_backs_looks_the_same() {
         }
     }
     assert!(drawn > 20_000, "{drawn}");
+}
+
+/// What is seen at each pixel by way of every triangle's runs: instance and face.
+fn by_runs(solid: &Solid, camera: &Camera) -> Vec<Option<(usize, usize)>> {
+    let mut projected = Projected::default();
+    project(solid, camera, &mut projected);
+    let mut nearest = vec![empty(camera); camera.pixels()];
+    let mut seen = vec![None; camera.pixels()];
+    each_triangle(solid, camera, &projected, |triangle, source| {
+        triangle.runs(|run| {
+            for column in run.from..run.to {
+                let i = run.row * camera.width as usize + column;
+                if run.nearness(column) > nearest[i] {
+                    (nearest[i], seen[i]) = (run.nearness(column), Some((source.instance, source.face)));
+                }
+            }
+        });
+    });
+    seen
+}
+
+/// The nearest face of each pixel is that of all triangles drawn one by one, and the normal is that face's: many meshes, large and
+/// small triangles, mirrored ones, open and closed, pictures narrower than the lanes.
+#[test]
+fn faces_are_those_of_all_triangles_drawn_by_runs() {
+    let mut random = Uniform(5);
+    let mut pixels = 0;
+    for round in 0..60 {
+        let [w, h] = [[96, 64], [7, 40], [200, 150]][round % 3];
+        let camera = Camera::default_for(w, h);
+        let shape = |i: usize| match i % 4 {
+            0 => sphere(24, 12),
+            1 => cuboid(Vec3::new(0.7, 0.4, 0.5)),
+            2 => lathe(&[(0.5, -0.8), (0.3, 0.1), (0.6, 0.7)], 24, round % 2 == 0),
+            _ => solid(
+                (0..30)
+                    .map(|k| Vec3::new((k % 6) as f32 - 2.5, (k / 6) as f32 - 2.0, ((k * 7) % 5) as f32 * 0.3))
+                    .collect(),
+                (0..24).map(|k| [k, k + 1, k + 6]).collect(),
+            ),
+        };
+        let placed: Vec<Solid> = (0..1 + round % 5)
+            .map(|i| {
+                let mut v = |scale: f64| DVec3::from_array(std::array::from_fn(|_| random.between(-scale, scale)));
+                let (at, turn, size) = (v(1.2), v(3.0), v(0.7) + DVec3::splat(0.1));
+                shape(i + round).placed(Affine::new(at, turn, size))
+            })
+            .collect();
+        let solid = Solid::group(&placed);
+        let (frame, faces) = (render(&solid, &camera), by_runs(&solid, &camera));
+        assert_eq!(frame.depth, Frame::render(&solid, &camera, Channels::Depth).depth, "round {round}");
+        let mut projected = Projected::default();
+        project(&solid, &camera, &mut projected);
+        for (i, seen) in faces.iter().enumerate() {
+            let Some((instance, face)) = *seen else {
+                assert_eq!((frame.part[i], frame.normal[i]), (u16::MAX, [0.0; 3]), "round {round}");
+                continue;
+            };
+            pixels += 1;
+            let item = &solid.instances()[instance];
+            let (mesh, placement) = (&item.mesh, Placement::new(&camera, &item.affine));
+            let part = mesh.topology.parts.get(face).map_or(0, |p| p + item.first_part);
+            let points = projected.mesh(instance).corners(&mesh.topology, face as u32);
+            let slope = Slope::new(mesh, &placement, true, face, &points, WHOLE);
+            let (x, y) = ((i % w as usize) as f64 + 0.5, (i / w as usize) as f64 + 0.5);
+            let away = (camera.unproject(x, y, 1.0) - camera.eye).normalize();
+            let to_eye = -DVec3::new(away.dot(camera.right), away.dot(camera.up), -away.dot(camera.forward));
+            let wanted = Vec3::from_array(seen_normal(slope.at(x, y).as_vec3(), to_eye.as_vec3()));
+            assert_eq!(frame.part[i], part, "round {round}");
+            assert!(Vec3::from_array(frame.normal[i]).distance(wanted) < 1e-4, "round {round}");
+        }
+    }
+    assert!(pixels > 20_000, "{pixels}");
 }

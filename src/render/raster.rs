@@ -14,50 +14,47 @@ use crate::geom::{Mesh, Solid};
 use glam::DVec3;
 
 /// What a triangle is, besides its corners in the image.
-pub(super) struct Source<'a> {
+pub(super) struct Source {
     /// Index of the instance in the solid.
     pub instance: usize,
     /// Face of the instance's mesh.
     pub face: usize,
-    pub placement: &'a Placement,
-    /// Weights of the face's three corners at each corner of the triangle: other than the identity where the near
-    /// plane cut the face.
-    pub weights: [[f64; 3]; 3],
 }
 
-const WHOLE: [[f64; 3]; 3] = [[1.0, 0.0, 0.0], [0.0, 1.0, 0.0], [0.0, 0.0, 1.0]];
+/// Weights of a triangle that was not cut.
+pub(super) const WHOLE: [[f64; 3]; 3] = [[1.0, 0.0, 0.0], [0.0, 1.0, 0.0], [0.0, 0.0, 1.0]];
 
 /// Calls `draw` for each triangle that may touch the image, cut at the near plane. `projected` is that of [`project`].
 pub(super) fn each_triangle(
     solid: &Solid,
     camera: &Camera,
     projected: &Projected,
-    mut draw: impl FnMut(&Triangle, &Source<'_>),
+    mut draw: impl FnMut(&Triangle, &Source),
 ) {
     for (instance, item) in solid.instances().iter().enumerate() {
         let placement = &Placement::new(camera, &item.affine);
-        mesh_triangles(&item.mesh, placement, camera, &projected.mesh(instance), |triangle, face, weights| {
-            draw(triangle, &Source { instance, face, placement, weights });
+        mesh_triangles(&item.mesh, placement, camera, &projected.mesh(instance), |triangle, face| {
+            draw(triangle, &Source { instance, face });
         });
     }
 }
 
-/// As [`each_triangle`] for one mesh: `draw` gets the face and the weights of [`Source`].
+/// As [`each_triangle`] for one mesh: `draw` gets the face.
 fn mesh_triangles(
     mesh: &Mesh,
     placement: &Placement,
     camera: &Camera,
     vertices: &Vertices<'_>,
-    mut draw: impl FnMut(&Triangle, usize, [[f64; 3]; 3]),
+    mut draw: impl FnMut(&Triangle, usize),
 ) {
     if !vertices.whole {
-        return cut_triangles(mesh, placement, camera, vertices, draw);
+        return cut_triangles(mesh, placement, camera, vertices, |triangle, face, _| draw(triangle, face));
     }
     let (size, back) = (size(camera.width, camera.height), back(mesh, placement, vertices));
     for (face, corners) in mesh.topology.triangles.iter().enumerate() {
         let Some(places) = vertices.places(corners) else { continue };
         if let Some(triangle) = Triangle::within(corners.map(|v| vertices.point(v)), places, size, back) {
-            draw(&triangle, face, WHOLE);
+            draw(&triangle, face);
         }
     }
 }
@@ -72,8 +69,9 @@ fn back(mesh: &Mesh, placement: &Placement, vertices: &Vertices<'_>) -> f64 {
     }
 }
 
-/// The triangles of a mesh with vertices that are not in front of the near plane.
-fn cut_triangles(
+/// The triangles of a mesh with vertices that are not in front of the near plane. `draw` gets the face, and the weights of its three
+/// corners at each corner of the triangle: other than the identity where the near plane cut it.
+pub(super) fn cut_triangles(
     mesh: &Mesh,
     placement: &Placement,
     camera: &Camera,
@@ -217,7 +215,26 @@ pub(super) fn fill_mesh(
     let how = (size(camera.width, camera.height), back(mesh, placement, vertices));
     vectorised(
         #[inline(always)]
-        || candidates.fill(&mesh.topology, vertices, how, area, wanted, buffer),
+        || candidates.fill::<false>(&mesh.topology, vertices, how, (area, wanted), buffer, &mut []),
+    );
+}
+
+/// As [`fill_mesh`] for a mesh all of whose vertices are in front of the near plane and in the whole image, and `faces` gets the face
+/// of each pixel where this mesh is nearer than what was there.
+pub(super) fn fill_faces(
+    mesh: &Mesh,
+    placement: &Placement,
+    camera: &Camera,
+    vertices: &Vertices<'_>,
+    candidates: &mut Candidates,
+    buffer: &mut [f32],
+    faces: &mut [u32],
+) {
+    let how = (size(camera.width, camera.height), back(mesh, placement, vertices));
+    let (area, topology) = (Area::whole(camera), &mesh.topology);
+    vectorised(
+        #[inline(always)]
+        || candidates.fill::<true>(topology, vertices, how, (&area, Wanted::All), buffer, faces),
     );
 }
 

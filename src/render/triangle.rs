@@ -10,6 +10,7 @@ use super::place::{Extent, Place};
 use super::project::Point;
 use super::raster::Area;
 use glam::Vec4;
+use pulp::bytemuck::cast;
 use wide::{f32x8, i32x8};
 
 /// A run of pixels in one row; nearness changes linearly from pixel to pixel.
@@ -79,16 +80,29 @@ impl Plane {
         (self.first + self.by_row * (row as f64 + 0.5 - self.corner)) as f32
     }
 
-    /// Keeps the nearer of the lanes from a column of a row on and what is there, at `at` in a buffer.
+    /// Keeps the nearer of the lanes from a column of a row on and what is there, at `at` in a buffer. Gives the lanes that are
+    /// nearer, all of their bits set.
     #[inline(always)]
-    pub fn keep(&self, buffer: &mut [f32], at: usize, row: usize, from: usize, outside: i32x8) {
-        let Some(pixels) = buffer.get_mut(at..).and_then(|b| b.first_chunk_mut::<LANES>()) else { return };
+    pub fn keep(&self, buffer: &mut [f32], at: usize, row: usize, from: usize, outside: i32x8) -> f32x8 {
+        let Some(pixels) = buffer.get_mut(at..).and_then(|b| b.first_chunk_mut::<LANES>()) else { return f32x8::ZERO };
         let there = f32x8::new(*pixels);
         let offset = (from as i32 - self.origin as i32) as f32;
         let along = (f32x8::new(std::array::from_fn(|i| i as f32)) + offset) * self.step;
         let [lo, hi] = self.limits.map(f32x8::splat);
         let q = (along + self.row(row)).fast_max(lo).fast_min(hi);
-        *pixels = (q.simd_gt(there) & !all_bits(outside)).bitselect(q, there).to_array();
+        let nearer = q.simd_gt(there) & !all_bits(outside);
+        *pixels = nearer.bitselect(q, there).to_array();
+        nearer
+    }
+}
+
+/// Writes a face into the lanes that are nearer, at `at` in a buffer.
+#[inline(always)]
+pub(super) fn put_face(faces: &mut [u32], at: usize, face: u32, nearer: f32x8) {
+    let Some(pixels) = faces.get_mut(at..).and_then(|b| b.first_chunk_mut::<LANES>()) else { return };
+    let nearer: [u32; LANES] = cast(nearer);
+    for (pixel, nearer) in pixels.iter_mut().zip(nearer) {
+        *pixel = (*pixel & !nearer) | (face & nearer);
     }
 }
 
@@ -109,15 +123,13 @@ pub(super) fn is_flat(points: &[Point; 3]) -> bool {
 
 /// Twice the area in pixels; negative when counter-clockwise as seen in the image.
 #[inline(always)]
-fn area([a, b, c]: &[Point; 3]) -> f64 {
+pub(super) fn area([a, b, c]: &[Point; 3]) -> f64 {
     (b.x - a.x) * (c.y - a.y) - (b.y - a.y) * (c.x - a.x)
 }
 
 /// One triangle, ready to be drawn.
 pub(super) struct Triangle {
     pub points: [Point; 3],
-    /// Twice the area in pixels; negative when counter-clockwise as seen in the image.
-    pub area: f64,
     coverage: Coverage,
     plane: Plane,
 }
@@ -140,7 +152,7 @@ impl Triangle {
     #[inline(always)]
     fn covering(coverage: Coverage, points: [Point; 3]) -> Option<Triangle> {
         let plane = Plane::new(&points, coverage.columns[0])?;
-        Some(Triangle { area: area(&points), points, coverage, plane })
+        Some(Triangle { points, coverage, plane })
     }
 
     /// Calls `draw` for every row's run of pixels.
@@ -174,6 +186,27 @@ impl Triangle {
             for (column, pixel) in (from..).zip(pixels) {
                 let q = run.nearness(column);
                 *pixel = if q > *pixel { q } else { *pixel };
+            }
+        });
+    }
+
+    /// As [`Triangle::fill`] in an area, with the face written where the triangle is nearer.
+    #[inline(never)]
+    pub fn fill_faces(&self, buffer: &mut [f32], (faces, face): (&mut [u32], u32), area: &Area) {
+        let width = area.right - area.left;
+        self.runs(|run| {
+            let (from, to) = (run.from.max(area.left), run.to.min(area.right));
+            if run.row < area.top || from >= to {
+                return;
+            }
+            let start = (run.row - area.top) * width;
+            let range = start + from - area.left..start + to - area.left;
+            let (Some(pixels), Some(faces)) = (buffer.get_mut(range.clone()), faces.get_mut(range)) else { return };
+            for ((column, pixel), seen) in (from..).zip(pixels).zip(faces) {
+                let q = run.nearness(column);
+                if q > *pixel {
+                    (*pixel, *seen) = (q, face);
+                }
             }
         });
     }

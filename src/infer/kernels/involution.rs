@@ -6,8 +6,12 @@
 //! each move it is played again where it led, and has to lead back. The log ratio has the log absolute determinant of its
 //! Jacobian over the numbers among choices and auxiliary variables, found by differences of fourth order. So that these see
 //! everything, the body reads choices by `value(@x)` alone.
+//!
+//! Beside the map, choices may be proposed by distributions (`propose @y ~ d`), which read the state before: as if the new value
+//! were an auxiliary variable that changes places with the old one, which has a Jacobian of one. The density of the way back is
+//! that of the old value in the play on the new state. The map must not read what is proposed beside it, or does not return.
 
-use super::own::{Image, Own, Played, Source};
+use super::own::{Image, Own, Played, Source, log_density, log_volume, sampled, values};
 use crate::dist::Datum;
 use crate::infer::kernel::{At, Outcome, accepts, recoverable};
 use crate::infer::selection::fail;
@@ -97,6 +101,10 @@ impl Own {
             changes.push((*t, Change::Set(new)));
             undo.push((*t, Change::Set(old)));
         }
+        let (old, volume) = (values(trace, &forth.all), log_volume(trace, &forth.all));
+        undo.extend(forth.all.iter().filter_map(|p| Some((p.target, Change::Set(trace.stored(p.target)?)))));
+        let (new, proposed) = sampled(&forth.all, &mut rng);
+        changes.extend(proposed);
         let Some(w) = recoverable(trace.propose(&changes, at.draws(0)))? else { return Ok(Outcome::failed()) };
         if changes.iter().any(|(t, _)| trace.was_removed(*t)) || w.log_weight == f64::NEG_INFINITY {
             trace.rollback();
@@ -107,13 +115,15 @@ impl Own {
         let auxiliaries: Vec<Value> = forth_map.iter().filter(|m| m.choice.is_none()).map(|m| m.new.clone()).collect();
         let back = recoverable(self.play(trace, at, Source::Given(&auxiliaries), Some(&[])));
         let (log_back, wrong) = match &back {
-            Ok(Some(back)) => {
-                (back.log_density_of(&auxiliaries), self.does_not_return(&forth_map, &mapped(back, trace)))
+            Ok(Some(back)) if back.all.iter().map(|p| p.target).eq(forth.all.iter().map(|p| p.target)) => {
+                let density = back.log_density_of(&auxiliaries) + log_density(&back.all, &old);
+                (density, self.does_not_return(&forth_map, &mapped(back, trace)))
             }
             _ => (f64::NEG_INFINITY, None),
         };
         let drawn: Vec<Value> = forth.drawn.iter().map(|d| d.value.clone()).collect();
-        let ratio = at.tempered(&w) + log_back - forth.log_density_of(&drawn) + log_jacobian;
+        let log_forth = forth.log_density_of(&drawn) + log_density(&forth.all, &new);
+        let ratio = at.tempered(&w) + log_back - log_forth + log_jacobian + volume - log_volume(trace, &forth.all);
         // A place that the auxiliary variables cannot lead back from is refused, whatever the map does there.
         let wrong = wrong.filter(|_| log_back > f64::NEG_INFINITY);
         if wrong.is_none() && back.is_ok() && accepts(ratio, &mut rng) {
@@ -172,7 +182,7 @@ impl Own {
                     .filter_map(|(m, v)| Some((m.choice.as_ref()?.0.clone(), v.clone())))
                     .collect();
                 let auxiliaries = &values[choices.len()..];
-                let there = self.play(trace, at, Source::Given(auxiliaries), Some(&choices))?;
+                let there = self.play(trace, at, Source::Moved(auxiliaries), Some(&choices))?;
                 let image = at_new(&mapped(&there, trace), |m| &m.new);
                 if image.len() != n || there.drawn.len() != played.drawn.len() {
                     return Err(self.fault("what it maps depends on numbers that it moves".into()));

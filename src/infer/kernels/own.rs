@@ -29,7 +29,7 @@ pub(crate) struct Own {
 /// One `propose` of a play.
 pub(super) struct Proposed {
     address: Address,
-    target: Target,
+    pub target: Target,
     dist: Dist,
 }
 
@@ -71,6 +71,8 @@ impl Played {
 pub(super) enum Source<'a> {
     Drawn(&'a mut Stream),
     Given(&'a [Value]),
+    /// Given, where the map alone is asked for and not what is proposed beside it.
+    Moved(&'a [Value]),
 }
 
 impl Own {
@@ -165,7 +167,8 @@ impl Play<'_> {
                 }
                 KStmtKind::Map { target, value } => {
                     let image = self.image(target, trace, variables)?;
-                    if self.played.images.iter().any(|(i, _)| *i == image) {
+                    let proposed = |p: &Proposed| matches!(image, Image::Choice(_, t) if t == p.target);
+                    if self.played.images.iter().any(|(i, _)| *i == image) || self.played.all.iter().any(proposed) {
                         return Err(fail(s.span, "this is given a new value twice in one kernel".into()));
                     }
                     let value = evaluate(value, &mut self.env(trace, variables))?;
@@ -177,13 +180,13 @@ impl Play<'_> {
                         variables.push((Arc::clone(name), value));
                         continue;
                     }
-                    if maps(&self.own.declared.body) {
-                        let mut e = fail(s.span, "a kernel with a map draws auxiliary variables only".into());
-                        e.hint = Some("propose u ~ normal(0, 1); propose @x = value(@x) + u; propose u = -u;".into());
-                        return Err(e);
+                    if matches!(self.source, Source::Moved(_)) {
+                        continue;
                     }
                     let proposed = self.proposed(target, dist, trace, variables)?;
-                    if self.played.all.iter().any(|p| p.target == proposed.target) {
+                    let mapped = |i: &(Image, Value)| matches!(i.0, Image::Choice(_, t) if t == proposed.target);
+                    let twice = self.played.all.iter().any(|p| p.target == proposed.target);
+                    if twice || self.played.images.iter().any(mapped) {
                         return Err(fail(s.span, "this choice is proposed twice in one kernel".into()));
                     }
                     self.played.all.push(proposed);
@@ -211,7 +214,9 @@ impl Play<'_> {
         let dist = self.distribution(dist, trace, variables)?;
         let value = match &mut self.source {
             Source::Drawn(rng) => Value::from_datum(&dist.sample(rng)),
-            Source::Given(values) => values.get(self.played.drawn.len()).cloned().unwrap_or_default(),
+            Source::Given(values) | Source::Moved(values) => {
+                values.get(self.played.drawn.len()).cloned().unwrap_or_default()
+            }
         };
         self.played.drawn.push(Drawn { name: Arc::clone(name), dist, value: value.clone() });
         Ok(value)
@@ -288,12 +293,12 @@ fn maps(body: &[KStmt]) -> bool {
 }
 
 /// What choices are now, as the program sees them.
-fn values(trace: &Trace, all: &[Proposed]) -> Vec<Option<Datum>> {
+pub(super) fn values(trace: &Trace, all: &[Proposed]) -> Vec<Option<Datum>> {
     all.iter().map(|p| trace.value(p.target).to_datum()).collect()
 }
 
 /// Values drawn for all choices that are proposed, and the changes to them.
-fn sampled(all: &[Proposed], rng: &mut Stream) -> (Vec<Option<Datum>>, Vec<(Target, Change)>) {
+pub(super) fn sampled(all: &[Proposed], rng: &mut Stream) -> (Vec<Option<Datum>>, Vec<(Target, Change)>) {
     let draw = |p: &Proposed| {
         let x = p.dist.sample(rng);
         (Some(x.clone()), (p.target, Change::Value(x)))
@@ -302,7 +307,7 @@ fn sampled(all: &[Proposed], rng: &mut Stream) -> (Vec<Option<Datum>>, Vec<(Targ
 }
 
 /// The log of how much larger a volume of values is than that of the white noise they are stored as, over all of these choices.
-fn log_volume(trace: &Trace, all: &[Proposed]) -> f64 {
+pub(super) fn log_volume(trace: &Trace, all: &[Proposed]) -> f64 {
     let one = |p: &Proposed| {
         let dist = trace.dist(p.target).filter(Dist::is_stored_whitened)?;
         let (noise, value) = (trace.stored(p.target)?, trace.value(p.target).to_datum()?);
@@ -312,7 +317,7 @@ fn log_volume(trace: &Trace, all: &[Proposed]) -> f64 {
 }
 
 /// The log density of drawing these values; what a proposal cannot draw has none.
-fn log_density(all: &[Proposed], values: &[Option<Datum>]) -> f64 {
+pub(super) fn log_density(all: &[Proposed], values: &[Option<Datum>]) -> f64 {
     let one = |(p, x): (&Proposed, &Option<Datum>)| match x {
         Some(x) if p.dist.support().fits(x) => p.dist.log_density(x),
         _ => f64::NEG_INFINITY,

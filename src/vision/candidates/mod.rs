@@ -14,6 +14,7 @@ mod merge;
 mod mirror;
 mod picture;
 mod profile;
+mod rim;
 mod score;
 #[cfg(test)]
 mod tests;
@@ -24,6 +25,7 @@ use cut::Field;
 use felzenszwalb::{Edges, felzenszwalb};
 use merge::{Rule, merge};
 use picture::Picture;
+pub use rim::tilts;
 use score::{Judge, suppressed};
 
 /// Regions are at least and at most this part of the picture.
@@ -66,6 +68,9 @@ pub struct Axis {
     /// Half-widths across the axis in the middles of 24 equal parts from foot to top, in pixels of
     /// the photograph; smoothed lightly, above 0.
     pub widths: Vec<f64>,
+    /// How much speaks for each of the [`tilts`], 0 to 1: whether a flat end, a rim or a foot, is
+    /// seen as an ellipse so high.
+    pub rims: Vec<f64>,
 }
 
 /// A region that may be an object of revolution.
@@ -85,7 +90,7 @@ pub fn candidates(photo: &Photo, options: &CandidateOptions) -> Vec<Candidate> {
     let (width, height) = (f64::from(photo.width()), f64::from(photo.height()));
     let scale = [width / picture.width as f64, height / picture.height as f64];
     let candidate = |(score, area): (f64, Area)| {
-        let axes = mirror::mirrors(&area).iter().map(|m| profile::axis(&area, m, scale)).collect();
+        let axes = mirror::mirrors(&area).iter().map(|m| profile::axis(&picture, &area, m, scale)).collect();
         let mask = Mask::new(area.width as u32, area.height as u32, area.on).ok()?;
         Some(Candidate { score, mask, axes })
     };

@@ -3,6 +3,8 @@
 use super::Axis;
 use super::area::Area;
 use super::mirror::Mirror;
+use super::picture::Picture;
+use super::rim::rims;
 
 /// Places along an axis at which there are widths.
 const PLACES: usize = 24;
@@ -11,9 +13,9 @@ const LINES: usize = 4;
 /// Steps across, pixels.
 const STEP: f64 = 0.25;
 
-/// The axis of a mirror, where a pixel of the region is `scale` pixels of the photograph wide and
-/// high.
-pub fn axis(area: &Area, mirror: &Mirror, scale: [f64; 2]) -> Axis {
+/// The axis of a mirror of a region of a picture, where a pixel is `scale` pixels of the photograph
+/// wide and high.
+pub fn axis(picture: &Picture, area: &Area, mirror: &Mirror, scale: [f64; 2]) -> Axis {
     let normal = [libm::cos(mirror.angle), libm::sin(mirror.angle)];
     // Upwards in the picture; to the right where it is level.
     let up = if normal[0] > 0.0 { [normal[1], -normal[0]] } else { [-normal[1], normal[0]] };
@@ -34,6 +36,16 @@ pub fn axis(area: &Area, mirror: &Mirror, scale: [f64; 2]) -> Axis {
     let line = |l: usize| width(low + (high - low) * (l as f64 + 0.5) / (PLACES * LINES) as f64);
     let lines: Vec<f64> = (0..PLACES * LINES).map(line).collect();
     let means: Vec<f64> = lines.chunks(LINES).map(|c| c.iter().sum::<f64>() / c.len() as f64).collect();
+    let means = smoothed(&means);
+    let length = high - low;
+    // By distance from the foot, linear between the middles of the parts.
+    let width = |d: f64| {
+        let t = (d / length * PLACES as f64 - 0.5).clamp(0.0, (PLACES - 1) as f64);
+        let i = (t as usize).min(PLACES - 2);
+        means[i] + (t - i as f64) * (means[i + 1] - means[i])
+    };
+    let foot = rims(picture, length, width, |d, x| at(low + d, x));
+    let top = rims(picture, length, |d| width(length - d), |d, x| at(high - d, x));
     let across = libm::hypot(normal[0] * scale[0], normal[1] * scale[1]);
     let place = |along: f64| {
         let p = at(along, 0.0);
@@ -43,7 +55,8 @@ pub fn axis(area: &Area, mirror: &Mirror, scale: [f64; 2]) -> Axis {
         symmetry: mirror.symmetry,
         foot: place(low),
         top: place(high),
-        widths: smoothed(&means).into_iter().map(|w| (w * across).max(0.25)).collect(),
+        widths: means.iter().map(|w| (w * across).max(0.25)).collect(),
+        rims: foot.into_iter().rev().chain(top).collect(),
     }
 }
 

@@ -5,6 +5,7 @@
 //! surface (Ramamoorthi & Hanrahan 2001, "An efficient representation for irradiance environment maps": harmonics of first and
 //! second order), but for the one of `3 z^2 - 1`, which on the visible half is close to `z`. Invariant: the result is finite.
 
+use crate::num::simd::vectorised;
 use crate::vision::photo::LinearImage;
 
 /// Functions of the normal.
@@ -33,30 +34,73 @@ fn terms([x, y, z]: [f32; 3]) -> [f64; TERMS] {
 /// The log ratio of the marginal likelihoods of the brightness of the pixels whose group is not 0: linear in functions of the
 /// normal against constant. 0 with fewer than two pixels. Pixels whose normal is not finite are left out.
 pub(super) fn log_ratio(groups: &[u8], normals: &[[f32; 3]], brightness: &[f32]) -> f64 {
-    let mut products = [[0.0f64; ALL]; ALL];
-    for ((_, n), b) in groups.iter().zip(normals).zip(brightness).filter(|((g, _), _)| **g > 0) {
-        if !(n[0] + n[1] + n[2] + b).is_finite() {
-            continue;
-        }
-        let mut v = [1.0; ALL];
-        v[1..=TERMS].copy_from_slice(&terms(*n));
-        v[ALL - 1] = f64::from(*b);
-        for (row, x) in products.iter_mut().zip(v) {
-            for (p, y) in row.iter_mut().zip(v) {
-                *p += x * y;
+    let mut sums = Sums { some: [[0.0; SOME]; ALL], count: 0, products: [[[0.0; LANES]; ALL]; ALL] };
+    vectorised(
+        #[inline(always)]
+        || {
+            for ((_, n), b) in groups.iter().zip(normals).zip(brightness).filter(|((g, _), _)| **g > 0) {
+                if (n[0] + n[1] + n[2] + b).is_finite() {
+                    sums.push(*n, *b);
+                }
             }
-        }
-    }
-    from_products(&products)
+            sums.add();
+        },
+    );
+    from_products(&sums.products.map(|row| row.map(|lanes| lanes.iter().sum())))
 }
 
-/// From sums of products of (1, terms, brightness). The constant has a flat prior, so one degree of freedom goes to it.
+/// Pixels whose products are summed at a time.
+const SOME: usize = 64;
+/// Sums that are kept apart, so that they need not wait for each other: always as many, so that the result is always the same.
+const LANES: usize = 8;
+
+/// Sums of the products of (1, terms, brightness), of which those above the diagonal are kept.
+struct Sums {
+    some: [[f64; SOME]; ALL],
+    count: usize,
+    products: [[[f64; LANES]; ALL]; ALL],
+}
+
+impl Sums {
+    #[inline(always)]
+    fn push(&mut self, normal: [f32; 3], brightness: f32) {
+        let i = self.count % SOME;
+        self.some[0][i] = 1.0;
+        for (column, x) in self.some[1..=TERMS].iter_mut().zip(terms(normal)) {
+            column[i] = x;
+        }
+        self.some[ALL - 1][i] = f64::from(brightness);
+        self.count = i + 1;
+        if self.count == SOME {
+            self.add();
+        }
+    }
+
+    /// Adds the products of the pixels that wait; places without one count 0.
+    #[inline(always)]
+    fn add(&mut self) {
+        let Sums { some, count, products } = self;
+        some.iter_mut().for_each(|column| column[*count..].fill(0.0));
+        for (i, row) in products.iter_mut().enumerate() {
+            for (j, sums) in row.iter_mut().enumerate().skip(i) {
+                for (x, y) in some[i].as_chunks::<LANES>().0.iter().zip(some[j].as_chunks::<LANES>().0) {
+                    for (sum, (x, y)) in sums.iter_mut().zip(x.iter().zip(y)) {
+                        *sum += x * y;
+                    }
+                }
+            }
+        }
+        *count = 0;
+    }
+}
+
+/// From sums of products of (1, terms, brightness), of which those above the diagonal count. The constant has a flat prior, so one degree of freedom goes to it.
 fn from_products(products: &[[f64; ALL]; ALL]) -> f64 {
     let n = products[0][0];
     if n < 2.0 {
         return 0.0;
     }
-    let centred = |i: usize, j: usize| products[i][j] - products[0][i] * products[0][j] / n;
+    let centred = |i: usize, j: usize| products[i.min(j)][i.max(j)] - products[0][i] * products[0][j] / n;
     let total = centred(ALL - 1, ALL - 1).max(0.0);
     // Cholesky factor of X'X + ridge, and the forward solution of X'y, in one go.
     let mut factor = [[0.0f64; TERMS]; TERMS];

@@ -6,7 +6,7 @@ use crate::lang::builtins::{Row, Type, arg, opt};
 use crate::lang::error::{Fault, FaultKind};
 use crate::lang::value::Value;
 use crate::render::Camera;
-use crate::vision::candidates::{Axis, Candidate, CandidateOptions, candidates};
+use crate::vision::candidates::{Axis, Candidate, CandidateOptions, candidates, tilts};
 use glam::DVec3;
 use std::sync::Arc;
 
@@ -23,7 +23,8 @@ pub(super) const TABLE: &[Row] = &[native(
     "Regions of a photograph that may be objects of revolution, the likeliest first. Each is a record: `score`; `mask`; `axes`, one or two \
      records, the more symmetric first: `symmetry`, 0 to 1; the ends `foot` and `top`, where the plane through the origin that faces the \
      camera is seen there; their distance `length`; the unit vectors `along`, from foot to top, and `toward` the camera; `widths`, 24 half widths \
-     from foot to top. Lengths are in scene units. A function of picture and camera alone, found once.",
+     from foot to top; `tilts`, 80 angles by which the axis may be turned towards the camera, radians, and `rims`, how much speaks for each of \
+     them, 0 to 1: whether an end, if it is flat, is seen as an ellipse so high. Lengths are in scene units. A function of picture and camera alone, found once.",
     |a| {
         if matches!(a.values.first(), Some(Value::Unit)) {
             return Ok(Value::List(Arc::from([])));
@@ -75,5 +76,7 @@ fn axis(a: &Axis, camera: &Camera, scale: [f64; 2]) -> Value {
         ("along", vector(along)),
         ("toward", vector(-camera.forward)),
         ("widths", Value::array(widths)),
+        ("tilts", Value::array(tilts().collect::<Vec<_>>())),
+        ("rims", Value::array(a.rims.clone())),
     ])
 }
