@@ -188,17 +188,17 @@ fn a_small_forest_finds_the_sides_of_a_square() {
     for k in 0..found.len() {
         let (x, y) = (found.x[k], found.y[k]);
         // In the middle of a side, far from the corners.
-        if found.strength[k] > 0.3 && (55.0..105.0).contains(&x) && (y - 60.0).abs() > 20.0 {
+        if found.strength[k] > 0.08 && (55.0..105.0).contains(&x) && (y - 60.0).abs() > 20.0 {
             assert!(found.tx[k].abs() > 0.9, "{x} {y}");
             sides[usize::from(y > 60.0)] += i32::from((y - 30.0).abs() < 2.0 || (y - 90.0).abs() < 2.0);
         }
-        if found.strength[k] > 0.3 && (35.0..85.0).contains(&y) && (x - 80.0).abs() > 20.0 {
+        if found.strength[k] > 0.08 && (35.0..85.0).contains(&y) && (x - 80.0).abs() > 20.0 {
             assert!(found.ty[k].abs() > 0.9, "{x} {y}");
             sides[2 + usize::from(x > 80.0)] += i32::from((x - 50.0).abs() < 2.0 || (x - 110.0).abs() < 2.0);
         }
     }
     assert!(sides.iter().all(|n| *n >= 40), "{sides:?}");
-    // The other forest of the same file, packed, says the same to the last bit.
+    // The same file packed is the same forest.
     assert_eq!(Forest::read(&gzip(small().yaml().as_bytes())).unwrap(), forest);
 }
 
@@ -272,7 +272,7 @@ fn files_that_cannot_be_used() {
         (changed(&|t| t.features[0] = 7228), "node 0 of tree 0 asks for feature 7228 of 7228"),
         (changed(&|t| t.thresholds.truncate(13)), "14 numbers of `childs`, but 13 of `thresholds`"),
         (changed(&|t| t.boundaries.truncate(10)), "14 nodes need 15 numbers of `edgeBoundaries`, not 10"),
-        (changed(&|t| t.boundaries[3] = 9), "must go up"),
+        (changed(&|t| t.boundaries[3] = 40), "must go up"),
         (changed(&|t| *t.boundaries.last_mut().unwrap() = 129), "at most 128"),
         (changed(&|t| t.pixels[0] = 13 * 256), "a patch's middle has 256 pixels"),
         (changed(&|t| t.pixels[0] = 70_000), "70000 is not a whole number from 0 to 65535"),
