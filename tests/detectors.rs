@@ -71,7 +71,7 @@ fn programs_name_their_detector() {
     let model = open(&f, PROGRAM).compile().unwrap_or_else(|e| panic!("{e}"));
     let [plain, by_trees, by_none, smoother] =
         ["plain", "by_trees", "by_none", "smoother"].map(|name| contours(&model, name));
-    assert!(plain.0 > 50 && by_trees.0 > 50 && smoother.0 > 20, "{plain:?} {by_trees:?} {smoother:?}");
+    assert!(plain.0 > 50 && by_trees.0 > 15 && smoother.0 > 20, "{plain:?} {by_trees:?} {smoother:?}");
     assert!(plain == by_none && plain != by_trees && by_trees != smoother);
     // Another file is another input.
     let hash = model.data_hash().to_owned();
@@ -141,7 +141,11 @@ fn the_command_takes_a_detector() {
     f.succeeds(&[&run[..], &["--out", "b", "--edges", "model.yml.gz"]].concat());
     f.succeeds(&[&run[..], &["--out", "c", "--edges", "model.yml"]].concat());
     let record = |name: &str| serde_json::from_str::<serde_json::Value>(&f.read(&format!("{name}/run.json"))).unwrap();
-    let draws = |name: &str| f.read(&format!("{name}/chain-1.csv"));
+    // Times are in lines that begin with `#`.
+    let draws = |name: &str| {
+        let text = f.read(&format!("{name}/chain-1.csv"));
+        text.lines().filter(|l| !l.starts_with('#')).map(str::to_owned).collect::<Vec<_>>()
+    };
     assert_eq!((record("a").get("edges"), &record("b")["edges"]), (None, &"model.yml.gz".into()));
     assert_ne!(record("a")["inputs_hash"], record("b")["inputs_hash"]);
     assert_ne!(draws("a"), draws("b"));

@@ -32,7 +32,7 @@ pub(super) const TABLE: &[Row] = &[native(
             Type::Num,
             "0.4",
             "Points weaker than this, of 1, are left out: they are more often texture than outline. With a structured forest 0.1, \
-             with a network 0.3, or 0.5 if it finds objects.",
+             with a network 0.5.",
         ),
         opt(
             "detector",
