@@ -153,7 +153,7 @@ fn the_command_takes_a_detector() {
     f.refuses(&[&run[..], &["--out", "d", "--edges", "model.yml, colours = 3"]].concat(), "must be \"rgb\" or \"bgr\"");
     f.refuses(&[&run[..], &["--out", "d", "--edges", "model.yml, bgr"]].concat(), "options are given by name");
     f.refuses(
-        &[&run[..], &["--out", "d", "--edges", "model.yml); data e = csv(\"x\""]].concat(),
+        &[&run[..], &["--out", "d", "--edges", "model.yml, bgr); data e = csv(\"x\""]].concat(),
         "options of a detector",
     );
     f.refuses(&["contours", "ball.png", "--edges", "model.yml", "--size", "5000"], "at most 2048");

@@ -255,6 +255,7 @@ impl Program {
     /// Contours of photographs are found by a detector wherever the program says nothing of it: a value as of `data d =
     /// detector("file");`, `None` for the detector that is built in.
     #[must_use]
+    #[doc(hidden)]
     pub fn detector(self, detector: DetectorValue) -> Program {
         self.default_argument("scene.edges", "detector", Value::object(detector))
     }

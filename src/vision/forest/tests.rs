@@ -1,3 +1,5 @@
+//! Features against their definition, leaves against the rules, and files that cannot be used.
+
 use super::features::{Features, Plane, smoothed};
 use super::writer::{Text, difference, gzip, options, small};
 use super::*;

@@ -1,3 +1,5 @@
+//! Networks written byte by byte, and what becomes of them.
+
 use super::*;
 use crate::vision::{ContourDetector, FileDetector};
 use image::{Rgb, RgbImage};
