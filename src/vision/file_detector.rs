@@ -20,7 +20,7 @@ pub struct FileDetector(Kind);
 enum Kind {
     Forest(Forest),
     #[cfg(feature = "onnx")]
-    Network(Network),
+    Network(Box<Network>),
 }
 
 impl FileDetector {
@@ -120,7 +120,7 @@ fn looks_like_onnx(bytes: &[u8]) -> bool {
 
 #[cfg(feature = "onnx")]
 fn network(bytes: &[u8], options: &NetworkOptions) -> Result<FileDetector, VisionError> {
-    Network::read(bytes, options).map(|n| FileDetector(Kind::Network(n)))
+    Network::read(bytes, options).map(|n| FileDetector(Kind::Network(Box::new(n))))
 }
 
 #[cfg(not(feature = "onnx"))]

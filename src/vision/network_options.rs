@@ -52,7 +52,8 @@ impl NetworkOptions {
     /// Why they make no sense, if they do not.
     pub(super) fn wrong(&self) -> Option<&'static str> {
         let all = || self.mean.iter().chain(&self.spread);
-        if !all().all(|v| v.is_finite()) || !(self.white > 0.0 && self.white <= 65535.0) {
+        let white = self.white > 0.0 && self.white <= 65535.0;
+        if !(white && all().all(|v| v.is_finite())) {
             return Some("`white` must be above 0 and at most 65535, `mean` and `spread` finite numbers");
         }
         if self.spread.iter().any(|s| *s <= 0.0) {

@@ -163,10 +163,13 @@ fn options(given: &[(String, usize)]) -> Result<ForestOptions, String> {
     };
     let o = &options;
     for (wrong, why) in [
-        (o.shrink % 2 != 0, "`shrinkNumber` must be even"),
-        (o.patch % o.shrink != 0, "`patchSize` must be a multiple of `shrinkNumber`"),
-        (o.stride % o.shrink != 0, "`stride` must be a multiple of `shrinkNumber`"),
-        (o.inner > o.patch || (o.patch - o.inner) % 2 != 0, "`patchInnerSize` must leave an even rest of `patchSize`"),
+        (!o.shrink.is_multiple_of(2), "`shrinkNumber` must be even"),
+        (!o.patch.is_multiple_of(o.shrink), "`patchSize` must be a multiple of `shrinkNumber`"),
+        (!o.stride.is_multiple_of(o.shrink), "`stride` must be a multiple of `shrinkNumber`"),
+        (
+            o.inner > o.patch || !(o.patch - o.inner).is_multiple_of(2),
+            "`patchInnerSize` must leave an even rest of `patchSize`",
+        ),
         (o.evaluated > o.trees, "`numberOfTreesToEvaluate` must be at most `numberOfTrees`"),
         (o.cells() < 2 * o.grid, "`selfsimilarityGridSize` must be at most half of `patchSize` by `shrinkNumber`"),
     ] {
@@ -189,7 +192,7 @@ fn checked(raw: Raw) -> Result<Forest, String> {
             return Err(format!("there are {count} numbers of `childs`, but {n} of `{name}`"));
         }
     }
-    if count == 0 || count % options.trees != 0 {
+    if count == 0 || !count.is_multiple_of(options.trees) {
         return Err(format!("{count} nodes cannot be those of {} trees of one size", options.trees));
     }
     let each = count / options.trees;

@@ -330,6 +330,7 @@ fn bombs_do_not_go_off() {
 #[test]
 #[ignore = "a measurement"]
 fn forest_of_full_size() {
+    let say = |text: String| std::io::Write::write_all(&mut std::io::stdout(), format!("{text}\n").as_bytes()).unwrap();
     let (trees, each, leaf) = (8usize, 60_001usize, 100usize);
     let mut text = Text { options: options(trees, 4), ..small() };
     text.children =
@@ -347,14 +348,14 @@ fn forest_of_full_size() {
     text.pixels = (0..*text.boundaries.last().unwrap()).map(|k| k * 7 % 256).collect();
     let (yaml, begun) = (text.yaml(), std::time::Instant::now());
     let forest = Forest::read(yaml.as_bytes()).unwrap();
-    println!("{} MB of text: {:.2} s", yaml.len() >> 20, begun.elapsed().as_secs_f64());
+    say(format!("{} MB of text: {:.2} s", yaml.len() >> 20, begun.elapsed().as_secs_f64()));
     let (packed, begun) = (gzip(yaml.as_bytes()), std::time::Instant::now());
     Forest::read(&packed).unwrap();
-    println!("{} MB packed: {:.2} s", packed.len() >> 20, begun.elapsed().as_secs_f64());
+    say(format!("{} MB packed: {:.2} s", packed.len() >> 20, begun.elapsed().as_secs_f64()));
     let rgb = RgbImage::from_fn(481, 321, |x, y| {
         Rgb([(x * 7 % 256) as u8, (y * 5 % 256) as u8, ((x / 40 + y / 40) * 60) as u8])
     });
     let (photo, begun) = (Photo::from_rgb(rgb).unwrap(), std::time::Instant::now());
     let map = forest.map(&photo, 512);
-    println!("a map of {} x {}: {:.3} s", map.width, map.height, begun.elapsed().as_secs_f64());
+    say(format!("a map of {} x {}: {:.3} s", map.width, map.height, begun.elapsed().as_secs_f64()));
 }
