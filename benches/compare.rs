@@ -10,7 +10,7 @@ use criterion::{Criterion, criterion_group, criterion_main};
 use pcadlang::render::{Camera, Channels, Contours, Frame};
 use pcadlang::vision::features::{Query, contour_features, observed, rendered};
 use pcadlang::vision::{
-    Chamfer, ChamferOptions, ContourDetector, ContourMap, ContourRatio, ContourRatioOptions, DepthLikelihood, DepthMap,
+    Chamfer, ChamferOptions, ContourMap, ContourRatio, ContourRatioOptions, DepthLikelihood, DepthMap,
     GradientDetector, Limits, Mask, MaskLikelihood, Region, RegionOptions, chamfer, contour_ratio, distance_transform,
     gradient, nms, photo, region,
 };
@@ -37,7 +37,7 @@ fn regions() -> [(&'static str, RegionOptions); 2] {
 
 /// Contours with contours.
 fn contours(c: &mut Criterion) {
-    let map = GradientDetector::default().detect(&photograph(SIDE));
+    let map = GradientDetector::default().contours(&photograph(SIDE));
     for size in [128, SIDE] {
         let contours = Contours::of(&vase().placed(pose(&mut 0.0)), &Camera::default_for(size, size));
         let elements = elements(&contours);
@@ -99,18 +99,18 @@ fn load(c: &mut Criterion) {
     c.bench_function("load/maxima", |b| b.iter(|| nms::suppress(black_box(&slopes), 0.0)));
     let fine = GradientDetector { size: SIDE, ..GradientDetector::default() };
     for (size, detector) in [(256, GradientDetector::default()), (SIDE, fine)] {
-        c.bench_function(&format!("load/detect at {size}"), |b| b.iter(|| detector.detect(black_box(&photo))));
+        c.bench_function(&format!("load/detect at {size}"), |b| b.iter(|| detector.contours(black_box(&photo))));
     }
-    let drawn = fine.detect(&photo).to_image();
+    let drawn = fine.contours(&photo).to_image();
     c.bench_function("load/contour map", |b| b.iter(|| ContourMap::from_image(black_box(&drawn))));
 }
 
 /// From contours, or the photograph, to comparators.
 fn prepare(c: &mut Criterion) {
     let photo = photograph(SIDE);
-    let map = GradientDetector::default().detect(&photo);
+    let map = GradientDetector::default().contours(&photo);
     let fine = GradientDetector { size: SIDE, ..GradientDetector::default() };
-    let set: Vec<bool> = fine.detect(&photo).to_image().pixels().map(|p| p.0[0] > 0).collect();
+    let set: Vec<bool> = fine.contours(&photo).to_image().pixels().map(|p| p.0[0] > 0).collect();
     c.bench_function("prepare/distance transform", |b| b.iter(|| distance_transform(SIDE, SIDE, black_box(&set))));
     for (name, options) in chamfers() {
         c.bench_function(&format!("prepare/chamfer {name}"), |b| {

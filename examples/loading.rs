@@ -14,8 +14,8 @@ use image::{DynamicImage, GrayImage, Luma, RgbImage};
 use pcadlang::vision::chamfer::{Chamfer, ChamferOptions};
 use pcadlang::vision::features::{Query, observed};
 use pcadlang::vision::{
-    ContourDetector, ContourMap, ContourRatio, ContourRatioOptions, DepthMap, GradientDetector, Limits, Mask, Photo,
-    Region, RegionOptions, distance_transform, gradient, nms, photo,
+    ContourMap, ContourRatio, ContourRatioOptions, DepthMap, GradientDetector, Limits, Mask, Photo, Region,
+    RegionOptions, distance_transform, gradient, nms, photo,
 };
 use std::error::Error;
 use std::fmt::Debug;
@@ -86,11 +86,11 @@ fn picture(name: &str, photo: &Photo, digest: bool) -> Result<(), Box<dyn Error>
     stage("maxima", &mut || Box::new(nms::suppress(&slopes, 0.0)));
     let fine = GradientDetector { size: SIDE, ..GradientDetector::default() };
     for (size, detector) in [(256, GradientDetector::default()), (SIDE, fine)] {
-        stage(&format!("detector at {size}"), &mut || Box::new(detector.detect(photo)));
-        let map = detector.detect(photo);
+        stage(&format!("detector at {size}"), &mut || Box::new(detector.contours(photo)));
+        let map = detector.contours(photo);
         compare(&format!("{size}"), &map, &stage);
     }
-    let map = fine.detect(photo);
+    let map = fine.contours(photo);
     let drawn = map.to_image();
     stage("contour map from a picture", &mut || Box::new(ContourMap::from_image(&drawn)));
     let grey: GrayImage = DynamicImage::from(photo.rgb().clone()).to_luma8();

@@ -3,6 +3,9 @@
 
 #[path = "common/folder.rs"]
 mod folder;
+#[allow(dead_code)]
+#[path = "../src/vision/forest/writer.rs"]
+mod forests;
 #[path = "common/gltf.rs"]
 #[allow(dead_code)]
 mod gltf;
@@ -25,7 +28,7 @@ use serde_json::json;
 
 type Target = fn(&[u8]);
 
-const TARGETS: [(&str, Target); 14] = [
+const TARGETS: [(&str, Target); 15] = [
     ("program_text", targets::program_text),
     ("program", targets::program),
     ("obj", targets::obj),
@@ -40,6 +43,7 @@ const TARGETS: [(&str, Target); 14] = [
     ("keypoints", targets::keypoints),
     ("table", targets::table),
     ("network", targets::network),
+    ("forest", targets::forest),
 ];
 
 fn root() -> &'static Path {
@@ -201,6 +205,10 @@ fn seeds_of(target: &str) -> Vec<Vec<u8>> {
             "\u{1}x;ok\n1;true\n",
         ]),
         "network" => vec![networks::file(b"TFL3", &networks::small())],
+        "forest" => {
+            let text = forests::small().yaml();
+            vec![forests::gzip(text.as_bytes()), text.into_bytes()]
+        }
         _ => Vec::new(),
     }
 }
@@ -256,6 +264,7 @@ fn seeds() {
                 "camera" => Camera::from_json(text()).is_ok(),
                 "keypoints" => People::parse(seed).is_ok(),
                 "network" => pcadlang::nn::Network::read(seed).is_ok(),
+                "forest" => pcadlang::vision::Forest::read(seed).is_ok(),
                 "checkpoint" => pcadlang::infer::Checkpoint::from_bytes(seed).is_ok(),
                 _ => true,
             };

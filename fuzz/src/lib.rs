@@ -16,7 +16,7 @@ use pcadlang::syntax::{parse, print, span::FileId};
 use pcadlang::trace::{Limits, SavedTrace, Trace};
 use pcadlang::vision::features::Query;
 use pcadlang::vision::keypoints::People;
-use pcadlang::vision::{Limits as Pixels, depth, mask, npy, photo};
+use pcadlang::vision::{Forest, Limits as Pixels, Photo, depth, mask, npy, photo};
 use pcadlang::{Model, Program, RunOptions};
 use std::io;
 use std::sync::atomic::Ordering;
@@ -345,6 +345,27 @@ pub fn network(bytes: &[u8]) {
             assert_eq!(outputs, Ok(network.output_shapes().len()));
         }
         Ok(_) => {}
+        Err(e) => assert!(!e.to_string().is_empty()),
+    }
+}
+
+/// A picture that forests look at.
+fn looked_at() -> &'static Photo {
+    static PHOTO: OnceLock<Photo> = OnceLock::new();
+    let read = || photo::decode(include_bytes!("../../examples/images/table_lamp.png"), &Pixels::default());
+    PHOTO.get_or_init(|| read().unwrap_or_else(|e| panic!("{e}")).shrunk(48))
+}
+
+/// A structured forest: what is read says something finite of each pixel of a picture.
+pub fn forest(bytes: &[u8]) {
+    match Forest::read(bytes) {
+        Ok(forest) => {
+            let map = forest.map(looked_at(), 48);
+            assert_eq!(map.values.len(), map.width as usize * map.height as usize);
+            assert!(map.values.iter().all(|v| v.is_finite()));
+            let contours = map.contours(1.0);
+            assert!(contours.strength.iter().all(|s| (0.0..=1.0).contains(s)));
+        }
         Err(e) => assert!(!e.to_string().is_empty()),
     }
 }

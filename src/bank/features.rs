@@ -128,7 +128,8 @@ impl Observed {
         let missing = |what: &str| BankError::Observed(format!("it is searched by {what}, and the run observes none"));
         match features {
             Features::Contours { .. } => {
-                Ok(Query::contours(&features::observed(image.ok_or_else(|| missing("a picture's contours"))?.map())))
+                let image = image.ok_or_else(|| missing("a picture's contours"))?;
+                Ok(Query::contours(&features::observed(image.map().map_err(BankError::Observed)?)))
             }
             Features::Keypoints { names } => {
                 let seen = self.keypoints.as_ref().and_then(|v| v.downcast::<KeypointsValue>());

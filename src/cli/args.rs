@@ -62,6 +62,11 @@ pub struct Given {
     /// The camera, as a JSON file; without one the default view (4.4 units across at distance 8)
     #[arg(long, value_name = "FILE")]
     pub camera: Option<PathBuf>,
+    /// What finds contours in photographs, in place of gradients of colour: a structured forest (model.yml.gz) or, if this
+    /// build has them, a network (.onnx). Options are written behind it as in `detector` of a program:
+    /// 'net.onnx, colours = "bgr", white = 255'
+    #[arg(long, value_name = "FILE[,OPTION=VALUE…]")]
+    pub edges: Option<String>,
     /// Whom it is about
     #[command(flatten)]
     pub who: Who,
@@ -430,9 +435,13 @@ pub struct Contours {
     /// The contour map to write
     #[arg(short, long, value_name = "FILE", default_value = "contours.png")]
     pub out: PathBuf,
-    /// The longer side at which contours are looked for, in pixels
-    #[arg(long, default_value_t = 256, value_parser = clap::value_parser!(u32).range(8..=8192))]
-    pub size: u32,
+    /// The longer side at which contours are looked for, in pixels; 256 if left out, 512 with --edges, at most 2048 then
+    #[arg(long, value_parser = clap::value_parser!(u32).range(8..=8192))]
+    pub size: Option<u32>,
+    /// What finds them, in place of gradients of colour: a structured forest (model.yml.gz) or, if this build has them, a
+    /// network (.onnx). Options are written behind it as in `detector` of a program: 'net.onnx, colours = "bgr", white = 255'
+    #[arg(long, value_name = "FILE[,OPTION=VALUE…]")]
+    pub edges: Option<String>,
 }
 
 /// `doc`.

@@ -58,6 +58,7 @@ fn job(a: &Check, path: &str) -> Job {
             program: path.to_owned(),
             sets: a.sets.clone(),
             camera: None,
+            edges: None,
             who: Who::default(),
             allowed: a.allowed.clone(),
         },

@@ -1,14 +1,31 @@
 //! `pcadlang contours`.
 
 use super::args::Contours;
-use super::{Failure, files, plain};
+use super::{Failure, edges, files, plain};
+use pcadlang::lang::builtins::scene::DetectorValue;
 use pcadlang::report::pictures::png;
-use pcadlang::vision::{ContourDetector, GradientDetector};
+use pcadlang::vision::{FileDetector, GradientDetector};
 
 /// Finds the contours of a photograph and writes them as a map.
 pub fn contours(a: &Contours) -> Result<(), Failure> {
     let photo = files::photo(&a.image)?;
-    let map = GradientDetector { size: a.size, ..GradientDetector::default() }.detect(&photo);
+    let map = match &a.edges {
+        None => {
+            let by = GradientDetector::default();
+            GradientDetector { size: a.size.unwrap_or(by.size), ..by }.contours(&photo)
+        }
+        Some(spec) => {
+            let DetectorValue(detector) = edges::detector(spec)?;
+            let detector = detector.ok_or_else(|| plain(format!("{spec} is no detector")))?;
+            let size = a.size.unwrap_or(FileDetector::SIZE);
+            if size > FileDetector::MOST {
+                let most = FileDetector::MOST;
+                return Err(plain(format!("--size {size}: with --edges the longer side is at most {most} pixels")));
+            }
+            let map = detector.map(&photo, size).map_err(|e| plain(format!("{spec}: {e}")))?;
+            detector.contours(&map, &photo, detector.sigma())
+        }
+    };
     let picture = png(&map.to_image()).map_err(|e| plain(e.to_string()))?;
     files::write(&a.out, &picture)?;
     println!("{}: {} contour points in {} x {} pixels", a.out.display(), map.len(), map.width, map.height);

@@ -6,12 +6,13 @@ use serde_json::{Map, Value};
 use std::path::Path;
 
 /// What must be the same for draws to be the same, and how it is called.
-const KEYS: [(&str, &str); 6] = [
+const KEYS: [(&str, &str); 7] = [
     ("version", "version"),
     ("program_hash", "program"),
     ("inputs_hash", "picture, camera or keypoints"),
     ("seed", "seed"),
     ("set", "--set"),
+    ("edges", "--edges"),
     ("settings", ""),
 ];
 

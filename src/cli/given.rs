@@ -32,6 +32,9 @@ pub fn program(given: &Given, quiet: bool) -> Result<Program, Failure> {
     for (name, value) in &given.sets {
         program = program.set(name, value);
     }
+    if let Some(spec) = &given.edges {
+        program = program.detector(super::edges::detector(spec)?);
+    }
     if let Some(path) = &given.camera {
         let text = String::from_utf8(files::read(path)?).map_err(|_| plain(format!("{}: not text", path.display())))?;
         let camera = Camera::from_json(&text).map_err(|e| plain(format!("{}: {e}", path.display())))?;

@@ -6,7 +6,7 @@ use super::args::Job;
 use super::best::{keep_best, show_best};
 use super::keypoints::Joints;
 use super::progress::{self, Ending};
-use super::{Failure, files, given, people, plain};
+use super::{Failure, edges, files, given, people, plain};
 use pcadlang::bank::BankFiles;
 use pcadlang::infer::draws::{KernelStats, Sink, SiteStats};
 use pcadlang::infer::{BestSoFar, BestState, ChainResult, Progress, Watch, Watches};
@@ -159,6 +159,9 @@ pub fn inputs_hash(job: &Job, model: &Model) -> Result<String, Failure> {
     for path in named.map(Path::new).chain(plain.map(|p| p.as_path())) {
         all.push_str(&bytes_hash(&files::read(path)?));
     }
+    if job.given.edges.is_some() {
+        all.push_str(&bytes_hash(&edges::bytes(job.given.edges.as_deref())?));
+    }
     Ok(text_hash(&all))
 }
 
@@ -200,7 +203,10 @@ pub fn record(job: &Job, program_hash: &str, inputs: &str) -> Map<String, Value>
         },
     });
     match record {
-        Value::Object(record) => record,
+        Value::Object(mut record) => {
+            record.extend(job.given.edges.iter().map(|e| ("edges".to_owned(), json!(e))));
+            record
+        }
         _ => Map::new(),
     }
 }
@@ -427,5 +433,6 @@ fn settings(job: &Job, model: &Model, elapsed: f64) -> Vec<(&'static str, String
     ];
     all.extend(job.given.sets.iter().map(|(k, v)| ("set", format!("{k} = {v}"))));
     all.extend(observed(job).map(|o| ("observe", o)));
+    all.extend(job.given.edges.iter().map(|e| ("edges", e.clone())));
     all
 }

@@ -8,6 +8,7 @@ mod contours;
 mod detect;
 mod doc;
 mod earlier;
+mod edges;
 mod evaluate;
 mod explain;
 mod files;

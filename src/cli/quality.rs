@@ -127,6 +127,7 @@ mod tests {
             program: "x.pcad".into(),
             sets: vec![("size".into(), "64".into())],
             camera: None,
+            edges: None,
             who: Default::default(),
             allowed: Default::default(),
         };

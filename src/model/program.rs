@@ -5,7 +5,7 @@ use super::{Error, Model};
 use crate::diag::SourceMap;
 use crate::host::Host;
 use crate::lang::builtins::data::Options;
-use crate::lang::builtins::scene::{CameraValue, DepthValue, ImageValue, KeypointsValue, MaskValue};
+use crate::lang::builtins::scene::{CameraValue, DepthValue, DetectorValue, ImageValue, KeypointsValue, MaskValue};
 use crate::lang::builtins::{Table, data};
 use crate::lang::code::Eager;
 use crate::lang::error::{Fault, FaultKind};
@@ -252,6 +252,20 @@ impl Program {
         CAMERAS.iter().fold(self, |p, (of, name)| p.default_argument(of, name, Value::object(CameraValue(camera))))
     }
 
+    /// Contours of photographs are found by a detector wherever the program says nothing of it: a value as of `data d =
+    /// detector("file");`, `None` for the detector that is built in.
+    #[must_use]
+    #[doc(hidden)]
+    pub fn detector(self, detector: DetectorValue) -> Program {
+        self.default_argument("scene.edges", "detector", Value::object(detector))
+    }
+
+    /// The detector that was chosen for the program.
+    fn chosen_detector(&self) -> Option<DetectorValue> {
+        let chosen = self.defaults.get(&("scene.edges".to_owned(), "detector".to_owned()))?;
+        chosen.downcast::<DetectorValue>().cloned()
+    }
+
     /// Without a camera, the default view in the shape of the first picture given, or of that of keypoints. Keypoints that do
     /// not say which picture they belong to belong to the first one.
     fn default_camera(&mut self) {
@@ -287,6 +301,9 @@ impl Program {
     /// Everything that is wrong with it.
     pub fn compile(mut self) -> Result<Model, Error> {
         self.default_camera();
+        let detector = self.chosen_detector();
+        let detecting = |v: Value| detector.as_ref().map_or_else(|| v.clone(), |d| ImageValue::detecting(&v, d));
+        self.data.values_mut().for_each(|v| *v = detecting(v.clone()));
         let (reach, files) = (&self.reach, &*self.files);
         let data_hash = RefCell::new(String::new());
         let read_data = |kind: &str, path: &str, folder: &str, options: &Options| {
@@ -295,7 +312,7 @@ impl Program {
             let mut files = files.lock().unwrap_or_else(PoisonError::into_inner);
             if let Some((value, hash)) = files.get(&key) {
                 data_hash.borrow_mut().push_str(hash);
-                return Ok(value.clone());
+                return Ok(detecting(value.clone()));
             }
             let file = data::path_of(kind, &beside);
             let (bytes, _) = read(reach, file).map_err(|e| {
@@ -306,7 +323,7 @@ impl Program {
             let hash = bytes_hash(&bytes);
             data_hash.borrow_mut().push_str(&hash);
             files.insert(key, (value.clone(), hash));
-            Ok(value)
+            Ok(detecting(value))
         };
         let inputs = Inputs {
             builtins: Arc::clone(&self.builtins),

@@ -24,7 +24,8 @@ const KEYWORDS: &[&str] = &[
 /// The tags that choices have by their distributions.
 const KINDS: &[&str] = &["$continuous", "$discrete", "$finite", "$gaussian"];
 /// What is read from files.
-const READERS: &[&str] = &["image", "csv", "json", "mesh", "armature", "keypoints", "mask", "depth", "contours"];
+const READERS: &[&str] =
+    &["image", "csv", "json", "mesh", "armature", "keypoints", "mask", "depth", "contours", "detector"];
 
 impl Session {
     /// What the word that ends at byte `at` of a line may become.

@@ -1,5 +1,7 @@
-//! Contour detectors. One is built in, from gradients; others (a trained network, a file) can take its place behind the trait.
+//! Contour detectors. One is built in, from gradients; those that files describe ([`super::FileDetector`]: structured forests,
+//! networks) and others can take its place behind the trait.
 
+use super::VisionError;
 use super::color::linear_to_labs;
 use super::contour_map::ContourMap;
 use super::gradient::colour_gradient;
@@ -10,7 +12,10 @@ use super::resize::fitted;
 /// Finds contours in photographs. The same photograph gives the same map, bit by bit.
 pub trait ContourDetector {
     /// The contours of a photograph. The map may be smaller than the photograph; it has its shape.
-    fn detect(&self, photo: &Photo) -> ContourMap;
+    ///
+    /// # Errors
+    /// If the detector cannot work on the photograph: a network may fail while it runs.
+    fn detect(&self, photo: &Photo) -> Result<ContourMap, VisionError>;
 }
 
 /// Contours as maxima of the colour gradient in L*a*b*. It knows nothing of objects: shadows and textures have edges too.
@@ -43,7 +48,15 @@ const COMMON_REFERENCE: f32 = 4.0;
 const COLOUR_WEIGHT: f32 = 2.0;
 
 impl ContourDetector for GradientDetector {
-    fn detect(&self, photo: &Photo) -> ContourMap {
+    /// As [`contours`](GradientDetector::contours), which never fails.
+    fn detect(&self, photo: &Photo) -> Result<ContourMap, VisionError> {
+        Ok(self.contours(photo))
+    }
+}
+
+impl GradientDetector {
+    /// The contours of a photograph.
+    pub fn contours(&self, photo: &Photo) -> ContourMap {
         let (width, height) = fitted(photo.width(), photo.height(), self.size);
         let mut lab = linear_to_labs(&photo.linear(width, height).rgb);
         lab.iter_mut().for_each(|[_, a, b]| (*a, *b) = (COLOUR_WEIGHT * *a, COLOUR_WEIGHT * *b));
@@ -79,7 +92,7 @@ mod tests {
     fn discs_have_their_circle() {
         // The last one differs in colour only.
         for (a, b) in [([255, 255, 255], [0, 0, 0]), ([90, 90, 90], [120, 120, 120]), ([170, 60, 60], [0, 111, 111])] {
-            let map = GradientDetector::default().detect(&disc(512, 160.0, a, b));
+            let map = GradientDetector::default().contours(&disc(512, 160.0, a, b));
             assert_eq!((map.width, map.height), (256, 256));
             assert!((450..=700).contains(&map.len()), "{}", map.len());
             for k in 0..map.len() {
@@ -95,10 +108,10 @@ mod tests {
     #[test]
     fn flat_and_tiny_pictures_have_no_contours() {
         let detector = GradientDetector::default();
-        assert!(detector.detect(&disc(100, 0.0, [9; 3], [200; 3])).is_empty());
+        assert!(detector.contours(&disc(100, 0.0, [9; 3], [200; 3])).is_empty());
         for (w, h) in [(1, 1), (1, 300), (300, 1)] {
             let photo = Photo::from_rgb(RgbImage::from_pixel(w, h, Rgb([5, 90, 200]))).unwrap();
-            assert!(detector.detect(&photo).is_empty());
+            assert!(detector.contours(&photo).is_empty());
         }
     }
 
@@ -112,7 +125,7 @@ mod tests {
             Rgb([if x.hypot(y) < 80.0 { 90 + contrast as u8 } else { 90 }; 3])
         });
         let d = GradientDetector::default();
-        let map = d.detect(&Photo::from_rgb(faint).unwrap());
+        let map = d.contours(&Photo::from_rgb(faint).unwrap());
         let weakest = map.strength.iter().copied().fold(1.0, f32::min);
         // A strength is m / (m + reference).
         assert!(weakest >= d.low / (1.0 + d.low), "{weakest}");
@@ -121,8 +134,8 @@ mod tests {
 
     #[test]
     fn brightness_does_not_matter() {
-        let strong = GradientDetector::default().detect(&disc(200, 60.0, [255; 3], [60; 3]));
-        let weak = GradientDetector::default().detect(&disc(200, 60.0, [120; 3], [100; 3]));
+        let strong = GradientDetector::default().contours(&disc(200, 60.0, [255; 3], [60; 3]));
+        let weak = GradientDetector::default().contours(&disc(200, 60.0, [120; 3], [100; 3]));
         let common =
             weak.to_image().pixels().zip(strong.to_image().pixels()).filter(|(a, b)| a.0[0] > 0 && b.0[0] > 0).count();
         assert!(common * 10 > 8 * strong.len(), "{common} {}", strong.len());

@@ -58,6 +58,9 @@ pub enum VisionError {
     /// A `.npy` file that cannot be used.
     #[error("not a usable .npy array: {0}")]
     Npy(String),
+    /// A file of a contour detector that cannot be used, or a detector that failed on a picture.
+    #[error("{0}")]
+    Detector(String),
     /// Two pictures that should be of one size are not.
     #[error("sizes differ: expected {expected_width} x {expected_height} pixels, got {got}")]
     Size {

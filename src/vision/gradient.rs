@@ -38,7 +38,7 @@ fn kernels(sigma: f32) -> (Vec<f64>, Vec<f64>) {
 }
 
 /// The place `i` of a line of `n`, mirrored at its ends (the end pixels count twice).
-fn mirrored(i: i64, n: i64) -> usize {
+pub(super) fn mirrored(i: i64, n: i64) -> usize {
     let m = i.rem_euclid(2 * n);
     (if m < n { m } else { 2 * n - 1 - m }) as usize
 }

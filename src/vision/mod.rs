@@ -17,16 +17,22 @@ pub mod error;
 pub mod exif;
 pub mod features;
 mod field;
+pub mod file_detector;
+pub mod forest;
 pub mod gradient;
 pub mod keypoints;
 pub mod mask;
 mod nearest;
+mod network_options;
 pub mod nms;
 pub mod npy;
+#[cfg(feature = "onnx")]
+pub mod onnx;
 pub mod people;
 pub mod photo;
 pub mod region;
 pub mod resize;
+pub mod soft_map;
 mod thin;
 
 #[cfg(test)]
@@ -40,7 +46,10 @@ pub use detector::{ContourDetector, GradientDetector};
 pub use distance_transform::{DistanceMap, distance_transform};
 pub use elements::{ComparatorError, Elements, Step};
 pub use error::VisionError;
+pub use file_detector::{FileDetector, NetworkOptions};
+pub use forest::Forest;
 pub use keypoints::{KeypointLikelihood, KeypointOptions, Keypoints};
 pub use mask::{Mask, MaskLikelihood};
 pub use photo::{Limits, Photo};
 pub use region::{Region, RegionOptions};
+pub use soft_map::SoftMap;

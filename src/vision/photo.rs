@@ -2,7 +2,7 @@
 //! Not a general picture reader. A [`Photo`] stands upright (Exif orientation applied), is opaque (alpha laid over white, on the
 //! sRGB values as viewers do) and has at least one pixel.
 
-use super::color::linear_table;
+use super::color::{linear_table, linear_to_srgb};
 use super::error::{VisionError, read_bytes};
 use super::{exif, resize};
 use image::{DynamicImage, ImageDecoder, ImageError, ImageFormat, ImageReader, RgbImage};
@@ -100,6 +100,19 @@ impl Photo {
             }
         });
         LinearImage { width, height, rgb }
+    }
+
+    /// The sRGB values, 0..=1, at `width` x `height` pixels: area-averaged in linear light, or in between if that is larger.
+    pub fn srgb(&self, width: u32, height: u32) -> Vec<[f32; 3]> {
+        let values = |rgb: &RgbImage| rgb.pixels().map(|p| p.0.map(|b| f32::from(b) / 255.0)).collect();
+        if (width, height) == self.rgb.dimensions() {
+            return values(&self.rgb);
+        }
+        if width > self.rgb.width() || height > self.rgb.height() {
+            return values(&image::imageops::resize(&self.rgb, width, height, image::imageops::FilterType::Triangle));
+        }
+        let linear = self.linear(width, height).rgb;
+        linear.iter().map(|p| p.map(|v| linear_to_srgb(f64::from(v).clamp(0.0, 1.0)) as f32)).collect()
     }
 
     /// The photo shrunk, in linear light, to a longer side of at most `longer` pixels; unchanged where it is smaller.

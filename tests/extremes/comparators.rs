@@ -6,9 +6,9 @@ use pcadlang::rng::{Purpose, StreamKey};
 use pcadlang::vision::chamfer::Mode;
 use pcadlang::vision::keypoints::{Detection, RelativeDepthLikelihood};
 use pcadlang::vision::{
-    Chamfer, ChamferOptions, ContourDetector, ContourMap, ContourRatio, ContourRatioOptions, DepthLikelihood, DepthMap,
-    Elements, GradientDetector, KeypointLikelihood, KeypointOptions, Mask, MaskLikelihood, Photo, Region,
-    RegionOptions, distance_transform,
+    Chamfer, ChamferOptions, ContourMap, ContourRatio, ContourRatioOptions, DepthLikelihood, DepthMap, Elements,
+    GradientDetector, KeypointLikelihood, KeypointOptions, Mask, MaskLikelihood, Photo, Region, RegionOptions,
+    distance_transform,
 };
 
 /// Pieces of contour that own their lists.
@@ -272,7 +272,7 @@ fn photographs_of_one_colour_and_of_noise_are_read() {
     ];
     for (name, w, h, colour) in pictures {
         let photo = Photo::from_rgb(image::RgbImage::from_fn(w, h, |x, y| image::Rgb([colour(x, y); 3]))).unwrap();
-        let map = GradientDetector::default().detect(&photo);
+        let map = GradientDetector::default().contours(&photo);
         let inside = |l: &[f32], most: u32| l.iter().all(|v| (0.0..=most as f32).contains(v));
         points.check(inside(&map.x, w) && inside(&map.y, h), || format!("{name}: contours beyond the picture"));
         points.check(!["black", "white", "one pixel"].contains(&name) || map.is_empty(), || {

@@ -7,9 +7,9 @@ mod dataset;
 mod observed;
 
 use super::args::{Evaluate, Given, Job};
-use super::earlier;
 use super::job::{CHECKPOINT, Interrupt, Manner};
 use super::{Failure, given, job, plain, quality, term};
+use super::{earlier, edges};
 use dataset::Case;
 pub use dataset::{Dataset, Layout, known};
 pub use observed::{Detections, Items, observations_for};
@@ -108,6 +108,7 @@ impl<'a> Evaluation<'a> {
         let items = Items::of(&program, detections.is_some())?;
         program.without_data().compile()?;
         let dir = EvaluationDir::open(&a.out).map_err(|e| plain(e.to_string()))?;
+        let edges = edges::bytes(a.given.edges.as_deref())?;
         let mut said = None;
         let task = |case: Case| {
             let camera = case.camera.clone().or_else(|| a.given.camera.clone());
@@ -116,7 +117,7 @@ impl<'a> Evaluation<'a> {
             let given = Given { camera, ..a.given.clone() };
             let mut job = Job { observe, ..Job::of(given, a.sampling.clone()) };
             said = quality::apply(&mut job, detections.is_some())?;
-            let inputs = bytes_hash(&observed::bytes(&case, detections.as_ref()));
+            let inputs = bytes_hash(&[observed::bytes(&case, detections.as_ref()), edges.clone()].concat());
             let record = job::record(&job, &hash, &inputs);
             let chosen = a.only.is_empty() || a.only.contains(&case.name);
             Ok(Task { case, job, record, chosen, row: None })

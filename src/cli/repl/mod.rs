@@ -63,6 +63,7 @@ fn job(a: &Repl, path: &str) -> Job {
             program: path.to_owned(),
             sets: a.sets.clone(),
             camera: a.camera.clone(),
+            edges: None,
             who: Default::default(),
             allowed: a.allowed.clone(),
         },

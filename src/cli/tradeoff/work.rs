@@ -80,6 +80,7 @@ fn job(a: &Tradeoff, Task { setting, case, seed }: Task, threads: u32) -> Job {
         program: setting.program.clone().unwrap_or_else(|| a.given.program.clone()),
         sets: a.given.sets.iter().cloned().chain(set).collect(),
         camera: case.camera.clone(),
+        edges: a.given.edges.clone(),
         who: a.given.who.clone(),
         allowed: a.given.allowed.clone(),
     };

@@ -11,13 +11,13 @@ mod options;
 
 pub use options::{Options, has_options};
 
-use super::scene::{DepthValue, ImageValue, KeypointsValue, MaskValue, SolidValue};
+use super::scene::{DepthValue, DetectorValue, ImageValue, KeypointsValue, MaskValue, SolidValue};
 use super::{Arg, Args, Row, Type, arg, function, opt};
 use crate::geom::{GeomError, Solid, gltf, obj};
 use crate::lang::error::{Fault, FaultKind};
 use crate::lang::value::Value;
 use crate::vision::keypoints::{self, Keypoints, People};
-use crate::vision::{ContourMap, Limits, VisionError, depth, mask, npy, photo};
+use crate::vision::{ContourMap, FileDetector, Limits, VisionError, depth, mask, npy, photo};
 
 const SECTION: &str = "Data files";
 
@@ -31,6 +31,17 @@ const SHAPE: &[Arg] = &[
     opt("up", Type::Str, "\"y\"", "The file's axis that points up: \"x\", \"y\" or \"z\"; it is turned to +y."),
     opt("unit", Type::Num, "1", "The length of the file's unit in scene units: 0.01 where it is centimetres.")
         .unit("m"),
+];
+
+const NETWORK: &[Arg] = &[
+    opt("file", Type::Str, "none", "The path, relative to the program's folder."),
+    opt("colours", Type::Str, "\"rgb\"", "The order of the channels that the network takes, \"rgb\" or \"bgr\"."),
+    opt("white", Type::Num, "1", "The value of white, above 0; what the network gets is (value - mean) / spread."),
+    opt("mean", Type::Any, "0", "The mean that is taken away: a number, or one for each channel."),
+    opt("spread", Type::Any, "1", "By what that is divided: a number, or one for each channel."),
+    opt("output", Type::Any, "the last", "The output that is the map: its name, or its number from 1."),
+    opt("logits", Type::Bool, "false", "Whether the map is of log odds, not of probabilities."),
+    opt("shows", Type::Str, "\"contours\"", "What the map shows, \"contours\" or \"objects\"."),
 ];
 
 const fn kind(name: &'static str, returns: Type, doc: &'static str) -> Row {
@@ -48,6 +59,15 @@ pub(super) const TABLE: &[Row] = &[
     kind("contours", Type::Object("an image"), "A ready contour map: bright pixels are contour."),
     kind("mask", Type::Object("a mask"), "A mask: bright pixels are the object."),
     kind("depth", Type::Object("a depth map"), "A depth map: `.npy`, or a 16-bit PNG in thousandths of a scene unit."),
+    function(
+        "detector",
+        SECTION,
+        NETWORK,
+        Type::Object("a detector"),
+        "What finds contours in photographs, for `scene.edges`: a structured forest of OpenCV (`model.yml.gz`), or a network (`.onnx`; \
+         only in builds with the feature `onnx`), which the options are for; without a file the one that is built in. See `docs/detectors.md`.",
+        not_an_expression,
+    ),
     function(
         "armature",
         SECTION,
@@ -90,9 +110,14 @@ pub fn kinds() -> impl Iterator<Item = &'static str> + Clone {
     TABLE.iter().map(|b| b.name)
 }
 
-/// The value of a data item of a kind that is given no file, for those that can do without: no keypoints.
+/// The value of a data item of a kind that is given no file, for those that can do without: no keypoints, the detector that is
+/// built in.
 pub fn without_file(kind: &str) -> Option<Value> {
-    (kind == "keypoints").then(|| Value::object(KeypointsValue(Keypoints::default())))
+    match kind {
+        "keypoints" => Some(Value::object(KeypointsValue(Keypoints::default()))),
+        "detector" => Some(Value::object(DetectorValue::default())),
+        _ => None,
+    }
 }
 
 /// The file to read for data of a kind: what is given, but for keypoints without the `#ID` that chooses a person.
@@ -136,6 +161,9 @@ pub fn load(kind: &str, file: &str, bytes: &[u8], options: &Options, beside: &Be
             let scale = if npy::is_npy(bytes) { 1.0 } else { 1000.0 };
             depth::decode(bytes, scale, &limits).map(|d| Value::object(DepthValue::new(d))).map_err(text)
         }
+        "detector" => FileDetector::read(bytes, options.network())
+            .map(|d| Value::object(DetectorValue(Some(d.into()))))
+            .map_err(text),
         "armature" => armature::load(file, bytes, options, beside),
         "keypoints" => return load_keypoints(file, bytes, None),
         "mesh" => {

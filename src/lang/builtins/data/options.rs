@@ -4,12 +4,16 @@
 
 use crate::geom::{FileFrame, UpAxis};
 use crate::lang::error::Fault;
-use crate::syntax::ast::{Arg, ExprKind};
+use crate::syntax::ast::{Arg, Expr, ExprKind, UnaryOp};
+use crate::vision::NetworkOptions;
+use crate::vision::file_detector::Output;
+use crate::vision::soft_map::Shows;
 
 /// How a file is to be read.
-#[derive(Clone, Copy, Debug, Default, PartialEq)]
+#[derive(Clone, Debug, Default, PartialEq)]
 pub struct Options {
     frame: FileFrame,
+    network: NetworkOptions,
 }
 
 impl Options {
@@ -18,12 +22,19 @@ impl Options {
         self.frame
     }
 
+    /// How a network takes its picture and gives its map.
+    pub fn network(&self) -> &NetworkOptions {
+        &self.network
+    }
+
     /// From the arguments of a call after the path; for [kinds](super::kinds) of data that have options.
     ///
     /// # Errors
     /// An argument of another name or type, or given twice, or outside its domain: with its place among the arguments.
     pub fn parse(kind: &str, args: &[Arg]) -> Result<Options, (usize, Fault)> {
-        let (mut up, mut unit) = (None, None);
+        let mut seen: Vec<&str> = Vec::new();
+        let mut frame = (UpAxis::default(), 1.0);
+        let mut network = NetworkOptions::default();
         for (i, a) in args.iter().enumerate() {
             let fault = |message: String| (i, Fault::type_error(message).with_hint(hint(kind)));
             let name = match &a.name {
@@ -34,40 +45,101 @@ impl Options {
                 }
                 None => return Err(fault(format!("{kind} takes one path"))),
             };
-            let again = match (name, &a.value.kind) {
-                ("up", ExprKind::Str(axis)) => {
-                    let axis = match &**axis {
-                        "x" => UpAxis::X,
-                        "y" => UpAxis::Y,
-                        "z" => UpAxis::Z,
-                        other => return Err(fault(format!("`up` must be \"x\", \"y\" or \"z\", not \"{other}\""))),
-                    };
-                    up.replace(axis).is_some()
-                }
-                ("unit", ExprKind::Num(x)) => unit.replace(*x).is_some(),
-                ("up", _) => return Err(fault("`up` must be an axis in quotes".into())),
-                ("unit", _) => return Err(fault("`unit` must be a number that is written out".into())),
-                _ => return Err(fault(format!("{kind} has no option `{name}`"))),
+            let set = match kind {
+                "detector" => set_network(&mut network, name, &a.value),
+                _ => set_frame(&mut frame, name, &a.value),
             };
-            if again {
+            if !set.map_err(fault)? {
+                return Err(fault(format!("{kind} has no option `{name}`")));
+            }
+            if seen.contains(&name) {
                 return Err(fault(format!("`{name}` is given twice")));
             }
+            seen.push(name);
         }
         // Only the unit can be refused.
         let at = args.iter().position(|a| a.name.as_ref().is_some_and(|n| &*n.node == "unit")).unwrap_or(0);
-        let frame = FileFrame::new(up.unwrap_or_default(), unit.unwrap_or(1.0));
-        frame.map(|frame| Options { frame }).map_err(|e| (at, Fault::type_error(e.to_string()).with_hint(hint(kind))))
+        let frame = FileFrame::new(frame.0, frame.1);
+        frame
+            .map(|frame| Options { frame, network })
+            .map_err(|e| (at, Fault::type_error(e.to_string()).with_hint(hint(kind))))
+    }
+}
+
+/// Sets an option of a mesh; false if there is none of that name.
+fn set_frame(frame: &mut (UpAxis, f64), name: &str, value: &Expr) -> Result<bool, String> {
+    match (name, &value.kind) {
+        ("up", ExprKind::Str(axis)) => {
+            frame.0 = match &**axis {
+                "x" => UpAxis::X,
+                "y" => UpAxis::Y,
+                "z" => UpAxis::Z,
+                other => return Err(format!("`up` must be \"x\", \"y\" or \"z\", not \"{other}\"")),
+            };
+        }
+        ("unit", ExprKind::Num(x)) => frame.1 = *x,
+        ("up", _) => return Err("`up` must be an axis in quotes".into()),
+        ("unit", _) => return Err("`unit` must be a number that is written out".into()),
+        _ => return Ok(false),
+    }
+    Ok(true)
+}
+
+/// Sets an option of a network; false if there is none of that name.
+fn set_network(network: &mut NetworkOptions, name: &str, value: &Expr) -> Result<bool, String> {
+    let word = |ways: [&str; 2]| match &value.kind {
+        ExprKind::Str(s) if **s == *ways[0] => Ok(false),
+        ExprKind::Str(s) if **s == *ways[1] => Ok(true),
+        _ => Err(format!("`{name}` must be \"{}\" or \"{}\"", ways[0], ways[1])),
+    };
+    let each = || match &value.kind {
+        ExprKind::Array(all) => match &all.iter().filter_map(number).collect::<Vec<_>>()[..] {
+            &[a, b, c] if all.len() == 3 => Some([a, b, c]),
+            _ => None,
+        },
+        _ => number(value).map(|x| [x; 3]),
+    };
+    let each = || each().ok_or_else(|| format!("`{name}` must be a number or a list of three that are written out"));
+    match name {
+        "colours" => network.bgr = word(["rgb", "bgr"])?,
+        "shows" => network.shows = if word(["contours", "objects"])? { Shows::Objects } else { Shows::Contours },
+        "white" => network.white = number(value).ok_or("`white` must be a number that is written out")?,
+        "mean" => network.mean = each()?,
+        "spread" => network.spread = each()?,
+        "logits" => match value.kind {
+            ExprKind::Bool(b) => network.logits = b,
+            _ => return Err("`logits` must be true or false".into()),
+        },
+        "output" => match &value.kind {
+            ExprKind::Str(name) => network.output = Output::Named(name.to_string()),
+            ExprKind::Num(n) if *n >= 1.0 && *n <= 1e6 && n.fract() == 0.0 => {
+                network.output = Output::Number(*n as usize)
+            }
+            _ => return Err("`output` must be a name in quotes or a number from 1".into()),
+        },
+        _ => return Ok(false),
+    }
+    Ok(true)
+}
+
+/// A number that is written out.
+fn number(e: &Expr) -> Option<f32> {
+    match &e.kind {
+        ExprKind::Num(x) => Some(*x as f32),
+        ExprKind::Unary { op: UnaryOp::Neg, expr } => number(expr).map(|x| -x),
+        _ => None,
     }
 }
 
 /// Whether data of a kind have options.
 pub fn has_options(kind: &str) -> bool {
-    matches!(kind, "mesh" | "armature")
+    matches!(kind, "mesh" | "armature" | "detector")
 }
 
 fn hint(kind: &str) -> String {
-    match has_options(kind) {
-        true => format!("for example {kind}(\"file.glb\", up = \"z\", unit = 0.01)"),
-        false => format!("write {kind}(\"file\")"),
+    match kind {
+        "detector" => "for example detector(\"network.onnx\", colours = \"bgr\", white = 255, logits = true)".into(),
+        _ if has_options(kind) => format!("for example {kind}(\"file.glb\", up = \"z\", unit = 0.01)"),
+        _ => format!("write {kind}(\"file\")"),
     }
 }

@@ -136,6 +136,10 @@ assume r ~ uniform(0.5, 1.5);
 observe scene.depth(scene.render(scene.sphere(r)), size = 32) = seen as distance;",
     ),
     ("armature", "data body = armature(\"std/human/human.lod2.rig.json\");\nlet n = len(body.joints);"),
+    (
+        "detector",
+        "data photo = image(\"ball.png\");\ndata trees = detector(\"model.yml.gz\");\nlet found = scene.edges(photo, detector = trees);",
+    ),
     ("keypoints", "data points = keypoints(\"person.json\");\nlet n = points.count;"),
     ("mesh", "data dog = mesh(\"data/dog.obj\");\nlet view = scene.render(dog);"),
 ];

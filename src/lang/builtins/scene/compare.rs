@@ -250,7 +250,7 @@ impl ContourOf {
         let image = image(observed, &self.view, self.name())?;
         let camera = self.view.camera().scaled_to(self.size);
         image.ratios.get((self.options.clone(), camera.width, camera.height), |(options, w, h)| {
-            ContourRatio::prepare(image.map(), *w, *h, options).map_err(|e| format!("scene.contour: {e}"))
+            ContourRatio::prepare(image.map()?, *w, *h, options).map_err(|e| format!("scene.contour: {e}"))
         })
     }
 }
@@ -304,7 +304,7 @@ impl ChamferOf {
         let image = image(observed, &self.view, self.name())?;
         let camera = self.view.camera().scaled_to(self.size);
         image.chamfers.get((self.options.clone(), camera.width, camera.height), |(options, w, h)| {
-            Chamfer::prepare(image.map(), *w, *h, options).map_err(|e| format!("scene.chamfer: {e}"))
+            Chamfer::prepare(image.map()?, *w, *h, options).map_err(|e| format!("scene.chamfer: {e}"))
         })
     }
 }

@@ -1,54 +1,78 @@
 //! The contours of a photograph, found otherwise than by default.
 
-use super::{IMAGE, native};
-use crate::lang::builtins::scene::ImageValue;
+use super::observed::{Detecting, DetectorValue};
+use super::{DETECTOR, IMAGE, ImageValue, native};
 use crate::lang::builtins::{Row, Type, arg, opt};
-use crate::lang::error::Fault;
+use crate::lang::error::{Fault, FaultKind};
 use crate::lang::value::Value;
-use crate::vision::GradientDetector;
+use crate::vision::FileDetector;
 
 pub(super) const TABLE: &[Row] = &[native(
     "edges",
     "Comparing",
     &[
         arg("image", IMAGE, "The photograph. A ready contour map stays as it is."),
-        opt("size", Type::Int, "256", "The longer side of the picture worked on, 8 to 8192.").unit("pixels"),
+        opt(
+            "size",
+            Type::Int,
+            "256",
+            "The longer side of the picture worked on, 8 to 8192; with a detector from a file 512, at most 2048, and no matter to a \
+             network that has a size of its own.",
+        )
+        .unit("pixels"),
         opt(
             "smooth",
             Type::Num,
             "1.6",
-            "The spread of the smoothing, 0.3 to 32: more finds fewer and longer contours.",
+            "The spread of the smoothing, 0.3 to 32: more finds fewer and longer contours. With a detector from a file 1, of its map.",
         )
         .unit("pixels"),
         opt(
             "strength",
             Type::Num,
             "0.4",
-            "Points weaker than this, of 1, are left out: they are more often texture than outline.",
+            "Points weaker than this, of 1, are left out: they are more often texture than outline. With a structured forest 0.1, \
+             with a network 0.5.",
+        ),
+        opt(
+            "detector",
+            DETECTOR,
+            "the run's",
+            "What finds contours, `data d = detector(\"model.yml.gz\");`. Without one that of the run (`--edges`), or the one built \
+             in, from gradients of colour.",
         ),
     ],
     IMAGE,
-    "The photograph with its contours found by these settings, for comparators. Of one photograph and one setting they are found once.",
+    "The photograph with its contours found by these settings, for comparators. Of one photograph and one setting they are found once; \
+     a detector from a file is asked once for each size.",
     |a| {
         // A photograph that is not given, where a program is looked at without one.
         if matches!(a.values.first(), Some(Value::Unit)) {
             return Ok(Value::Unit);
         }
         let image = a.object::<ImageValue>(0, "an image")?;
-        let by = GradientDetector::default();
-        let size = if a.given(1) { a.int_in(1, 8, 8192)? as u32 } else { by.size };
-        let sigma = a.num_or(2, f64::from(by.sigma))?;
-        let strength = a.num_or(3, f64::from(ImageValue::STRONG))?;
-        if !(0.3..=32.0).contains(&sigma) {
+        let detector = if a.given(4) { Some(a.object::<DetectorValue>(4, "a detector")?) } else { None };
+        let (mut by, usual) = Detecting::usual(detector);
+        let (most, old_size, old_sigma) = match &by {
+            Detecting::Gradients(g) => (8192, g.size, g.sigma),
+            Detecting::File { size, sigma, .. } => (FileDetector::MOST, *size, *sigma),
+        };
+        let asked = if a.given(1) { a.int_in(1, 8, i64::from(most))? as u32 } else { old_size };
+        let smooth = a.num_or(2, f64::from(old_sigma))?;
+        let strength = a.num_or(3, f64::from(usual))?;
+        if !(0.3..=32.0).contains(&smooth) {
             return Err(a.outside(2, "from 0.3 to 32"));
         }
         if !(0.0..=1.0).contains(&strength) {
             return Err(a.outside(3, "from 0 to 1"));
         }
-        image
-            .detected_by(GradientDetector { size, sigma: sigma as f32, ..by }, strength as f32)
-            .map_err(Fault::domain)
-            .map(|found| found.unwrap_or_else(|| a.get(0).clone()))
+        match &mut by {
+            Detecting::Gradients(g) => (g.size, g.sigma) = (asked, smooth as f32),
+            Detecting::File { size, sigma, .. } => (*size, *sigma) = (asked, smooth as f32),
+        }
+        let found = image.detected_by(by, strength as f32);
+        let found = found.map_err(|e| Fault::new(FaultKind::Other, format!("scene.edges: {e}")))?;
+        Ok(found.unwrap_or_else(|| a.get(0).clone()))
     },
 )];
 
@@ -71,7 +95,7 @@ mod tests {
             image::Rgb(if (x / 16 + y / 16) % 2 == 0 { [240, 30, 20] } else { [10, 60, 200] })
         });
         let photo = Value::object(ImageValue::photo(Photo::from_rgb(rgb).unwrap()));
-        let count = |v: &Value| v.downcast::<ImageValue>().unwrap().map().len();
+        let count = |v: &Value| v.downcast::<ImageValue>().unwrap().map().unwrap().len();
         let (plain, smooth) = (edges(&photo, &[]).unwrap(), edges(&photo, &[256.0, 6.0]).unwrap());
         assert_eq!(count(&plain), count(&photo), "the defaults are those of a photograph by itself");
         assert!(count(&smooth) < count(&plain) && count(&smooth) > 0);

@@ -21,7 +21,7 @@ mod shapes;
 
 pub(crate) use compare::{by_contours, by_silhouette};
 pub use objects::{AffineValue, ArmatureValue, CameraValue, SolidValue, ViewValue};
-pub use observed::{DepthValue, ImageValue, KeypointsValue, MaskValue};
+pub use observed::{DepthValue, DetectorValue, ImageValue, KeypointsValue, MaskValue};
 
 use super::{Arg, Args, Row, Type, function};
 use crate::geom::GeomError;
@@ -34,6 +34,7 @@ const AFFINE: Type = Type::Object("a placement");
 const CAMERA: Type = Type::Object("a camera");
 const VIEW: Type = Type::Object("a view");
 const IMAGE: Type = Type::Object("an image");
+const DETECTOR: Type = Type::Object("a detector");
 
 /// A pure function of the module.
 const fn native(

@@ -5,8 +5,8 @@ use crate::lang::value::{Object, Value};
 use crate::vision::candidates::{Candidate, CandidateOptions};
 use crate::vision::people::Person;
 use crate::vision::{
-    Chamfer, ChamferOptions, ContourDetector, ContourMap, ContourRatio, ContourRatioOptions, DepthLikelihood, DepthMap,
-    GradientDetector, Keypoints, Mask, MaskLikelihood, Photo, Region, RegionOptions,
+    Chamfer, ChamferOptions, ContourMap, ContourRatio, ContourRatioOptions, DepthLikelihood, DepthMap, FileDetector,
+    GradientDetector, Keypoints, Mask, MaskLikelihood, Photo, Region, RegionOptions, SoftMap,
 };
 use std::any::Any;
 use std::sync::{Arc, Mutex, OnceLock, PoisonError};
@@ -53,12 +53,19 @@ type Key<O> = (O, u32, u32);
 #[derive(Debug, Default)]
 pub struct ImageValue {
     photo: Option<Photo>,
-    map: OnceLock<ContourMap>,
+    /// Its contours, once they were asked for, or given.
+    map: OnceLock<Result<ContourMap, String>>,
+    /// Whether the contours were given.
+    ready: bool,
+    /// What finds its contours where a program says nothing of it.
+    by: OnceLock<DetectorValue>,
     pub(super) ratios: Prepared<Key<ContourRatioOptions>, ContourRatio>,
     pub(super) chamfers: Prepared<Key<ChamferOptions>, Chamfer>,
     pub(super) regions: Prepared<Key<RegionOptions>, Region>,
     /// The same photograph with contours found otherwise: by what, and how strong they must be.
-    detected: Prepared<(GradientDetector, f32), Value>,
+    detected: Prepared<(Detecting, f32), Value>,
+    /// What detectors from files say of its pixels, at a size.
+    soft: Prepared<(DetectorValue, u32), SoftMap>,
     /// What may be objects in it, by how they were looked for.
     pub(super) candidates: Prepared<CandidateOptions, Vec<Candidate>>,
     /// The people in the photograph, by how they were looked for: views, and how many at most.
@@ -77,7 +84,7 @@ impl ImageValue {
 
     /// A ready contour map, with the photograph if there is one.
     pub fn contours(map: ContourMap, photo: Option<Photo>) -> Self {
-        ImageValue { photo, map: OnceLock::from(map), ..ImageValue::default() }
+        ImageValue { photo, map: OnceLock::from(Ok(map)), ready: true, ..ImageValue::default() }
     }
 
     /// The photograph.
@@ -91,28 +98,117 @@ impl ImageValue {
     }
 
     /// Its contours.
-    pub fn map(&self) -> &ContourMap {
-        self.map.get_or_init(|| match &self.photo {
-            Some(photo) => strong(GradientDetector::default().detect(photo), Self::STRONG),
-            None => ContourMap::default(),
-        })
+    ///
+    /// # Errors
+    /// If a detector was chosen for it that fails on it.
+    pub fn map(&self) -> Result<&ContourMap, String> {
+        let found = self.map.get_or_init(|| match &self.photo {
+            Some(photo) => {
+                let (by, least) = Detecting::usual(self.by.get());
+                self.found(photo, &by).map(|map| strong(map, least))
+            }
+            None => Ok(ContourMap::default()),
+        });
+        found.as_ref().map_err(String::clone)
     }
 
-    /// The same photograph with contours found by a detector, those at least so strong; `None` if there is no photograph.
-    pub(super) fn detected_by(&self, detector: GradientDetector, least: f32) -> Result<Option<Value>, String> {
+    /// The photograph with its contours found by a detector wherever a program says nothing of it; contours that were given stay.
+    pub fn detecting(image: &Value, by: &DetectorValue) -> Value {
+        match image.downcast::<ImageValue>() {
+            Some(ImageValue { photo: Some(photo), ready: false, map, by: known, .. }) => {
+                // Contours that were looked at before were found by what was chosen then.
+                if map.get().is_none() {
+                    let _ = known.set(by.clone());
+                }
+                if known.get() == Some(by) {
+                    return image.clone();
+                }
+                Value::object(ImageValue { by: OnceLock::from(by.clone()), ..ImageValue::photo(photo.clone()) })
+            }
+            _ => image.clone(),
+        }
+    }
+
+    /// The same photograph with contours found in a way of its own, those at least so strong; `None` if there is no photograph.
+    pub(super) fn detected_by(&self, by: Detecting, least: f32) -> Result<Option<Value>, String> {
         let Some(photo) = &self.photo else { return Ok(None) };
-        let found = self.detected.get((detector, least), |(detector, least)| {
-            let map = strong(detector.detect(photo), *least);
+        let found = self.detected.get((by, least), |(by, least)| {
+            let map = strong(self.found(photo, by)?, *least);
             Ok(Value::object(ImageValue::contours(map, Some(photo.clone()))))
         })?;
         Ok(Some(Value::clone(&found)))
+    }
+
+    fn found(&self, photo: &Photo, by: &Detecting) -> Result<ContourMap, String> {
+        match by {
+            Detecting::Gradients(detector) => Ok(detector.contours(photo)),
+            Detecting::File { detector, size, sigma } => {
+                let Some(file) = &detector.0 else { return Err("the detector is of no file".into()) };
+                let soft =
+                    self.soft.get((detector.clone(), *size), |_| file.map(photo, *size).map_err(|e| e.to_string()))?;
+                Ok(file.contours(&soft, photo, *sigma))
+            }
+        }
     }
 
     /// Width and height in pixels.
     pub fn size(&self) -> (u32, u32) {
         match &self.photo {
             Some(p) => (p.width(), p.height()),
-            None => (self.map().width, self.map().height),
+            None => self.map().map_or((0, 0), |m| (m.width, m.height)),
+        }
+    }
+}
+
+/// What finds contours, from a file; without one the detector that is built in. Clones share it.
+#[derive(Clone, Debug, Default)]
+pub struct DetectorValue(pub Option<Arc<FileDetector>>);
+
+impl PartialEq for DetectorValue {
+    /// Whether they were read at once: a detector that is read again may be another.
+    fn eq(&self, other: &Self) -> bool {
+        match (&self.0, &other.0) {
+            (Some(a), Some(b)) => Arc::ptr_eq(a, b),
+            (a, b) => a.is_none() && b.is_none(),
+        }
+    }
+}
+
+impl Object for DetectorValue {
+    fn type_name(&self) -> &'static str {
+        "a detector"
+    }
+
+    fn as_any(&self) -> &dyn Any {
+        self
+    }
+}
+
+/// A detector with its settings.
+#[derive(Clone, Debug, PartialEq)]
+pub(super) enum Detecting {
+    /// The one that is built in.
+    Gradients(GradientDetector),
+    /// One that was read from a file.
+    File {
+        /// Which one.
+        detector: DetectorValue,
+        /// The longer side of the picture worked on.
+        size: u32,
+        /// The spread of the smoothing.
+        sigma: f32,
+    },
+}
+
+impl Detecting {
+    /// A detector with the settings that suit it, and how strong its contours must be.
+    pub fn usual(detector: Option<&DetectorValue>) -> (Detecting, f32) {
+        match detector.and_then(|d| d.0.as_ref().map(|file| (d, file))) {
+            Some((d, file)) => {
+                let (detector, size, sigma) = (d.clone(), FileDetector::SIZE, file.sigma());
+                (Detecting::File { detector, size, sigma }, file.strength())
+            }
+            None => (Detecting::Gradients(GradientDetector::default()), ImageValue::STRONG),
         }
     }
 }

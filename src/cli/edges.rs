@@ -1,0 +1,74 @@
+//! `--edges`: another detector of contours than the one that is built in.
+
+use super::{Failure, files};
+use pcadlang::lang::builtins::data::{self, Options};
+use pcadlang::lang::builtins::scene::DetectorValue;
+use pcadlang::syntax::ast::{ExprKind, ItemKind};
+use pcadlang::syntax::parse;
+use pcadlang::syntax::span::FileId;
+use std::path::Path;
+use std::sync::{Mutex, PoisonError};
+
+/// The detector that was read last, and by what: a command that runs a program many times reads it once.
+static LAST: Mutex<Option<(String, DetectorValue)>> = Mutex::new(None);
+
+/// The file of `FILE[, OPTION = VALUE, …]`, and its options. A file that is called so is a file.
+fn split(spec: &str) -> (&str, &str) {
+    match spec.split_once(',') {
+        Some((file, options)) if !Path::new(spec).exists() => (file.trim(), options.trim()),
+        _ => (spec, ""),
+    }
+}
+
+/// The file that `FILE[, OPTION = VALUE, …]` names.
+pub fn file_of(spec: &str) -> &Path {
+    Path::new(split(spec).0)
+}
+
+/// The detector that `FILE[, OPTION = VALUE, …]` means, with the options of `detector` as a program writes them.
+pub fn detector(spec: &str) -> Result<DetectorValue, Failure> {
+    let mut last = LAST.lock().unwrap_or_else(PoisonError::into_inner);
+    if let Some((_, known)) = last.as_ref().filter(|(s, _)| s == spec) {
+        return Ok(known.clone());
+    }
+    let (file, text) = split(spec);
+    let options = options(text)?;
+    let bytes = files::read(Path::new(file))?;
+    let alone = |other: &str| Err(format!("{file} names {other}, but a detector is one file"));
+    let loaded = data::load("detector", file, &bytes, &options, &alone);
+    let loaded = loaded.map_err(|f| Failure::Plain(f.message, f.hint))?;
+    let detector = loaded.downcast::<DetectorValue>().cloned().unwrap_or_default();
+    *last = Some((spec.to_owned(), detector.clone()));
+    Ok(detector)
+}
+
+/// `colours = "bgr", white = 255`, read as the arguments of a call.
+fn options(text: &str) -> Result<Options, Failure> {
+    if text.is_empty() {
+        return Ok(Options::default());
+    }
+    let wrong = |why: &str, hint: Option<String>| {
+        let hint = hint.or_else(|| Some("for example --edges 'network.onnx, colours = \"bgr\", white = 255'".into()));
+        Failure::Plain(format!("--edges: {why} (`{text}`)"), hint)
+    };
+    let (program, errors) = parse(&format!("data d = detector({text});"), FileId(0));
+    let args = match program.items.first().map(|i| &i.kind) {
+        Some(ItemKind::Data(d)) if errors.is_empty() && program.items.len() == 1 => {
+            match d.default.as_ref().map(|e| &e.kind) {
+                Some(ExprKind::Call { args, .. }) => Some(args),
+                _ => None,
+            }
+        }
+        _ => None,
+    };
+    let args = args.ok_or_else(|| wrong("options of a detector were expected behind the file", None))?;
+    Options::parse("detector", args).map_err(|(_, f)| wrong(&f.message, f.hint))
+}
+
+/// What contours depend on besides the picture: the bytes of the file and the options.
+pub fn bytes(spec: Option<&str>) -> Result<Vec<u8>, Failure> {
+    let Some(spec) = spec else { return Ok(Vec::new()) };
+    let mut all = files::read(file_of(spec))?;
+    all.extend(split(spec).1.as_bytes());
+    Ok(all)
+}

@@ -1,0 +1,160 @@
+//! Contour detectors that files describe: structured forests and, with the feature `onnx`, networks.
+
+use super::VisionError;
+use super::contour_map::ContourMap;
+use super::detector::ContourDetector;
+use super::forest::Forest;
+pub use super::network_options::{NetworkOptions, Output};
+#[cfg(feature = "onnx")]
+use super::onnx::Network;
+use super::photo::Photo;
+use super::resize::fitted;
+use super::soft_map::{Shows, SoftMap};
+
+/// A detector that was read from a file. It makes a map of a photograph, which takes time, and finds contours in the map, which does
+/// not: whoever tries several settings keeps the map.
+#[derive(Debug)]
+pub struct FileDetector(Kind);
+
+#[derive(Debug)]
+enum Kind {
+    Forest(Forest),
+    #[cfg(feature = "onnx")]
+    Network(Box<Network>),
+}
+
+impl FileDetector {
+    /// The longer side of the picture worked on, pixels, unless something else is asked for.
+    pub const SIZE: u32 = 512;
+    /// The longest side of the picture worked on that may be asked for.
+    pub const MOST: u32 = 2048;
+
+    /// Reads the file of a detector. The options are for networks.
+    ///
+    /// # Errors
+    /// If it is of no kind that is known, or is damaged, or needs a feature that this build was made without; or if the options do
+    /// not fit it.
+    pub fn read(bytes: &[u8], options: &NetworkOptions) -> Result<FileDetector, VisionError> {
+        if Forest::is_forest(bytes) {
+            if *options != NetworkOptions::default() {
+                return Err(VisionError::Detector("a structured forest has no options".into()));
+            }
+            return Ok(FileDetector(Kind::Forest(Forest::read(bytes)?)));
+        }
+        if let Some(why) = options.wrong() {
+            return Err(VisionError::Detector(why.into()));
+        }
+        match looks_like_onnx(bytes) {
+            true => network(bytes, options),
+            false if bytes.is_empty() => Err(VisionError::Empty),
+            false => Err(VisionError::Detector(
+                "neither a structured forest (OpenCV's model.yml or model.yml.gz) nor a network (ONNX)".into(),
+            )),
+        }
+    }
+
+    /// What it says of every pixel of a photograph. Forests work at a longer side of at most `size` pixels, and so do networks that
+    /// take any size; others work at their own.
+    ///
+    /// # Errors
+    /// If a network fails while it runs, or gives no map.
+    pub fn map(&self, photo: &Photo, size: u32) -> Result<SoftMap, VisionError> {
+        let size = size.clamp(1, FileDetector::MOST);
+        match &self.0 {
+            Kind::Forest(forest) => Ok(forest.map(photo, size)),
+            #[cfg(feature = "onnx")]
+            Kind::Network(network) => network.map(photo, size),
+        }
+    }
+
+    /// The contours in a map of it, after smoothing by `sigma` pixels, in a picture that has the photograph's shape.
+    pub fn contours(&self, map: &SoftMap, photo: &Photo, sigma: f32) -> ContourMap {
+        let found = map.contours(sigma);
+        let shape = fitted(photo.width(), photo.height(), map.width.max(map.height));
+        if shape == (map.width, map.height) { found } else { found.scaled_to(shape.0, shape.1) }
+    }
+
+    /// How much its maps are smoothed unless something else is asked for, pixels of the map.
+    pub fn sigma(&self) -> f32 {
+        match self.shows() {
+            Shows::Contours => 1.0,
+            Shows::Objects => 1.6,
+        }
+    }
+
+    /// How strong a contour must be to count, of 1, unless something else is asked for.
+    pub fn strength(&self) -> f32 {
+        match &self.0 {
+            // Edges that all trees agree on but for their place are about this strong: few pixels come near to 1.
+            Kind::Forest(_) => 0.1,
+            // HED's best threshold against human outlines is 0.65, and a few more edges help where the object is dim.
+            #[cfg(feature = "onnx")]
+            Kind::Network(_) => 0.5,
+        }
+    }
+
+    fn shows(&self) -> Shows {
+        match &self.0 {
+            Kind::Forest(_) => Shows::Contours,
+            #[cfg(feature = "onnx")]
+            Kind::Network(network) => network.shows(),
+        }
+    }
+}
+
+impl ContourDetector for FileDetector {
+    fn detect(&self, photo: &Photo) -> Result<ContourMap, VisionError> {
+        Ok(self.contours(&self.map(photo, FileDetector::SIZE)?, photo, self.sigma()))
+    }
+}
+
+/// ONNX files are protocol buffers without a mark of their own. All begin with a field of the model: its version (8), who wrote it
+/// (0x12), its graph (0x3a), or its sets of operators (0x42), the last two being letters, which control characters follow.
+fn looks_like_onnx(bytes: &[u8]) -> bool {
+    match bytes {
+        [0x08 | 0x12, _, ..] => true,
+        [0x3a | 0x42, rest @ ..] => rest.iter().take(8).any(|b| *b < 0x09),
+        _ => false,
+    }
+}
+
+#[cfg(feature = "onnx")]
+fn network(bytes: &[u8], options: &NetworkOptions) -> Result<FileDetector, VisionError> {
+    Network::read(bytes, options).map(|n| FileDetector(Kind::Network(Box::new(n))))
+}
+
+#[cfg(not(feature = "onnx"))]
+fn network(_: &[u8], _: &NetworkOptions) -> Result<FileDetector, VisionError> {
+    Err(VisionError::Detector(
+        "this build runs no networks (ONNX): it was made without the feature `onnx`; build it with \
+         `cargo install --path . --features onnx`"
+            .into(),
+    ))
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    fn error(bytes: &[u8], options: &NetworkOptions) -> String {
+        FileDetector::read(bytes, options).unwrap_err().to_string()
+    }
+
+    #[test]
+    fn files_are_told_apart() {
+        let plain = NetworkOptions::default();
+        assert_eq!(error(b"", &plain), "the file is empty");
+        assert!(error(b"\x89PNG\r\n", &plain).starts_with("neither a structured forest"));
+        assert!(error(b"Breakfast", &plain).starts_with("neither a structured forest"));
+        assert!(error(b"%YAML:1.0\n", &plain).contains("there are no `options`"));
+        assert!(error(b"\x1f\x8b", &plain).contains("line 1"));
+        assert_eq!(
+            error(b"%YAML:1.0", &NetworkOptions { bgr: true, ..NetworkOptions::default() }),
+            "a structured forest has no options"
+        );
+        let bad = NetworkOptions { spread: [1.0, 0.0, 1.0], ..NetworkOptions::default() };
+        assert_eq!(error(b"\x08\x07", &bad), "`spread` must be above 0");
+        #[cfg(not(feature = "onnx"))]
+        assert!(error(b"\x08\x07", &plain).contains("--features onnx"));
+    }
+}
