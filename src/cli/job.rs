@@ -3,8 +3,9 @@
 //! Invariant: `run.json` says `done` only when every other file of the folder is whole.
 
 use super::args::Job;
-use super::best::{keep_best, show_best};
+use super::best::{disagreement, keep_best, show_best};
 use super::keypoints::Joints;
+use super::places::{best_of_each, show_places};
 use super::progress::{self, Ending};
 use super::{Failure, edges, files, given, people, plain};
 use pcadlang::bank::BankFiles;
@@ -324,13 +325,16 @@ fn fill(
     let modes = modes(&quantities);
     let approximate = approximate(job, &chains);
     let sites = SiteStats::total(chains.iter().flat_map(|c| &c.sites));
+    let places = best_of_each(&modes, &best);
+    let best = best.state();
+    let mut drawn = show_best(dir, s.seed, model, best.as_deref(), &chains, ready.photo())?;
+    show_places(dir, s.seed, model, &places, ready.photo(), &mut drawn)?;
+    warnings.extend(disagreement(&drawn));
     let summary = json!({
         "quantities": summaries(&quantities, kernel_seconds(&kernels)), "kernels": kernels, "choices": sites,
         "modes": modes, "warnings": warnings, "approximate": approximate, "every": every,
     });
     write(dir, "summary.json", &serde_json::to_vec_pretty(&summary).unwrap_or_default())?;
-    let best = best.state();
-    let drawn = show_best(dir, s.seed, model, best.as_deref(), &chains, ready.photo())?;
     let elapsed = begun.elapsed().as_secs_f64();
     if let Some(found) = drawn.view.as_ref().and_then(|v| joints.report(v, elapsed)) {
         write(dir, "keypoints.json", &serde_json::to_vec_pretty(&found).unwrap_or_default())?;
@@ -347,6 +351,7 @@ fn fill(
     });
     write(dir, "report.html", html.as_bytes())?;
     let mut more = counts(&chains, best.as_deref(), &quantities);
+    more.extend(drawn.agreement.map(|a| ("agreement".into(), json!(a))));
     more.extend([("sampling_seconds".into(), json!(sampled)), ("seconds".into(), json!(elapsed))]);
     write_record(dir, record, if interrupted { "interrupted" } else { "done" }, Value::Object(more))?;
     Ok(Outcome {

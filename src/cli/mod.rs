@@ -19,6 +19,7 @@ mod keypoints;
 mod learn;
 mod manual;
 mod people;
+mod places;
 mod predict;
 mod progress;
 mod quality;

@@ -46,7 +46,8 @@ impl BestSoFar {
         each.max_by(|a, b| a.log_joint.total_cmp(&b.log_joint))
     }
 
-    fn of_chain(&self, chain: usize) -> Option<Arc<BestState>> {
+    /// The best state of one chain, by its number from 0, if it has made steps.
+    pub fn of_chain(&self, chain: usize) -> Option<Arc<BestState>> {
         self.chains.get(chain)?.lock().unwrap_or_else(PoisonError::into_inner).clone()
     }
 

@@ -21,21 +21,19 @@ use std::sync::Arc;
 use std::time::Duration;
 
 /// How a chain starts: with the best of so many draws from the prior, by log joint density.
-#[derive(Clone, Debug, PartialEq)]
+#[derive(Clone, Copy, Debug, PartialEq, Eq)]
 pub struct Start {
     /// Draws of positive probability that are tried.
     pub draws: u64,
     /// How many of the best are kept: more than one begin a population that anneals in warm-up.
     pub keep: usize,
-    /// What tells kinds of draws apart, by its value: those that are kept are the best of each kind, then the second best, and so on.
-    pub kinds: Option<Expr>,
     /// No further draws are tried after this, if one was found.
     pub within: Option<Duration>,
 }
 
 impl Default for Start {
     fn default() -> Self {
-        Start { draws: 1, keep: 1, kinds: None, within: None }
+        Start { draws: 1, keep: 1, within: None }
     }
 }
 
@@ -114,7 +112,7 @@ pub(crate) fn starts_from(
         let at = At::new(seed, chain, attempt).within(u64::MAX - 1);
         Ok(from.leap(&mut trace, &at)?.map(|()| trace))
     };
-    let mut best = Best { keep: how.keep.max(1), kinds: Vec::new() };
+    let mut best: Vec<Trace> = Vec::new();
     let mut found = 0;
     let mut last = None;
     for attempt in 0..how.draws.saturating_add(RETRIES) {
@@ -127,14 +125,11 @@ pub(crate) fn starts_from(
             Ok(None) => {}
             Ok(Some(t)) if t.log_joint() > f64::NEG_INFINITY => {
                 found += 1;
-                let mut t = t;
-                let kind = how.kinds.as_ref().map(|e| {
-                    let (draws, started) = (Draws { key, step: attempt, lane: 1 }, begun);
-                    let mut env = Scope { code, trace: &mut t, variables: &[], draws, started, steps: 0, moved: None };
-                    evaluate(e, &mut env)
-                });
-                let kind = kind.transpose().map_err(StartError::Run)?.unwrap_or_default();
-                best.add(kind, t);
+                let place = best.partition_point(|b| b.log_joint() >= t.log_joint());
+                if place < how.keep.max(1) {
+                    best.insert(place, t);
+                    best.truncate(how.keep.max(1));
+                }
             }
             Ok(Some(t)) => last = Some(Ok(t)),
             Err(e) if e.is_recoverable() => last = Some(Err(e)),
@@ -150,46 +145,10 @@ pub(crate) fn starts_from(
         }
     }
     match last {
-        _ if found > 0 => Ok(best.in_turn()),
+        _ if !best.is_empty() => Ok(best),
         Some(Ok(t)) => Err(StartError::Impossible(explain(&t))),
         Some(Err(e)) => Err(StartError::Run(e)),
         None => Err(StartError::Impossible(NoStart::default())),
-    }
-}
-
-/// The best draws of each kind, and the kinds by their best: as many of both as are kept.
-struct Best {
-    keep: usize,
-    kinds: Vec<(Value, Vec<Trace>)>,
-}
-
-impl Best {
-    fn add(&mut self, kind: Value, t: Trace) {
-        let mut own = match self.kinds.iter().position(|(k, _)| k.same(&kind)) {
-            Some(i) => self.kinds.remove(i).1,
-            None => Vec::new(),
-        };
-        let place = own.partition_point(|b| b.log_joint() >= t.log_joint());
-        own.insert(place, t);
-        own.truncate(self.keep);
-        let first = |own: &[Trace]| own.first().map_or(f64::NEG_INFINITY, Trace::log_joint);
-        let place = self.kinds.partition_point(|(_, other)| first(other) >= first(&own));
-        self.kinds.insert(place, (kind, own));
-        self.kinds.truncate(self.keep);
-    }
-
-    /// The best of each kind, then the second best of each, as many as are kept; the best of all comes first.
-    fn in_turn(self) -> Vec<Trace> {
-        let mut kinds: Vec<_> = self.kinds.into_iter().map(|(_, own)| own.into_iter()).collect();
-        let mut all = Vec::new();
-        while all.len() < self.keep {
-            let before = all.len();
-            all.extend(kinds.iter_mut().filter_map(Iterator::next).take(self.keep - before));
-            if all.len() == before {
-                break;
-            }
-        }
-        all
     }
 }
 
@@ -232,8 +191,7 @@ pub(crate) fn start_of(
             let draws = argument(args, 0, "n").map_or(Err(wrong()), &mut count)?;
             let keep = argument(args, 1, "keep").map_or(Ok(1), &mut count)?;
             let from = argument(args, 2, "from").map(|e| own(code, e, options)).transpose()?;
-            let (keep, within) = (keep.min(draws) as usize, options.time.map(|t| t / 4));
-            Ok((Start { draws, keep, kinds: argument(args, 3, "kinds").cloned(), within }, from))
+            Ok((Start { draws, keep: keep.min(draws) as usize, within: options.time.map(|t| t / 4) }, from))
         }
         _ => Err(wrong()),
     }
@@ -255,42 +213,4 @@ fn own(code: &Arc<Code>, e: &Expr, options: &RunOptions) -> Result<Own, ChainErr
     let mut env = Scope { code, trace: &mut trace, variables, draws, started, steps: 0, moved: None };
     let arguments = arguments(declared, args, e.span, &mut env)?;
     Ok(Own::new(Arc::clone(code), declared.clone(), arguments, started))
-}
-
-#[cfg(test)]
-mod tests {
-    use super::*;
-    use crate::model::Model;
-
-    fn begun(keep: usize, kinds: Option<&str>) -> Vec<f64> {
-        let kinds = kinds.map_or(String::new(), |k| format!(", kinds = {k}"));
-        let model = Model::from_text(&format!(
-            "assume x ~ uniform(-1, 1); observe normal(x, 0.1) = 0.9;
-             infer {{ init(best_of(200, keep = {keep}{kinds})); repeat 1 {{ collect x; }} }}"
-        ))
-        .unwrap();
-        let options = RunOptions::default();
-        let (how, from) = start_of(model.code(), &model.plan().unwrap().0, &options).unwrap();
-        let traces = starts_from(model.code(), (1, 0), how, from.as_ref(), Limits::default()).unwrap();
-        let x = |t: &Trace| match t.value(t.all_targets()[0]) {
-            Value::Num(x) => x,
-            v => panic!("{v}"),
-        };
-        traces.iter().map(x).collect()
-    }
-
-    /// Without kinds the best are all near the datum; with kinds they take turns, the best of all first.
-    #[test]
-    fn the_best_of_each_kind_are_kept_in_turn() {
-        let all = begun(4, None);
-        assert!(all.len() == 4 && all.iter().all(|x| *x > 0.8), "{all:?}");
-        let two = begun(4, Some("x > 0"));
-        assert_eq!(two.iter().map(|x| *x > 0.0).collect::<Vec<_>>(), [true, false, true, false], "{two:?}");
-        assert!(two[0] == all[0] && two[2] == all[1] && two[1] > two[3] && two[1] < 0.0, "{two:?}");
-        // More kinds than are kept: the best of the best kinds.
-        let many = begun(3, Some("[x > 0.5, x > 0, x > -0.5]"));
-        assert!(many[0] == all[0] && many[1] < 0.5 && many[1] > 0.4 && many[2] < 0.0 && many[2] > -0.1, "{many:?}");
-        // Fewer draws than are kept.
-        assert_eq!(begun(300, Some("x > 0")).len(), 200);
-    }
 }

@@ -12,12 +12,13 @@ pub const MARK: &str = "run.json";
 /// What it holds while an earlier run is cleared away.
 const CLEARED: &[u8] = b"{}";
 /// What a run writes besides `run.json`, the draws `chain-N.csv`, and what its program exports.
-const WRITTEN: [&str; 12] = [
+const WRITTEN: [&str; 13] = [
     "summary.json",
     "best.trace.json",
     "overlay.png",
     "contours.png",
     "uncertainty.png",
+    "modes.png",
     "mask.png",
     "depth.npy",
     "normals.npy",

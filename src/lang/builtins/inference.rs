@@ -257,12 +257,6 @@ pub(super) const TABLE: &[Row] = &[
                 "none",
                 "A kernel of the program, by whose proposals each draw is moved before they are compared, whatever their densities say.",
             ),
-            opt(
-                "kinds",
-                Type::Any,
-                "none",
-                "What tells kinds of draws apart, by its value: the best of each kind are kept first, then the second best, so that a population does not begin in one mode alone.",
-            ),
         ],
         Type::Kernel,
         "A start: the draw from the prior with the highest log joint density.",

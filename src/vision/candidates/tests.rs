@@ -234,3 +234,39 @@ fn a_cut_moves_to_the_object() {
     assert_eq!(twice.iter().map(|(s, _)| *s).collect::<Vec<_>>(), [0.3, 0.2]);
     assert_eq!(suppressed(vec![(0.2, truth.clone()), (0.3, truth)], OVERLAP, 9).len(), 1);
 }
+
+/// A bright vessel before a darker ground, seen from above by a tilt: a cylinder with a dark inside.
+fn vessel(tilt: f64, below: bool) -> Photo {
+    const RADIUS: f64 = 40.0;
+    let (flat, rim, foot) = (RADIUS * libm::sin(tilt), 75.0, 75.0 + 80.0 * libm::cos(tilt));
+    let ellipse = |x: f64, y: f64, middle: f64| (x / RADIUS).powi(2) + ((y - middle) / flat).powi(2) <= 1.0;
+    let picture = RgbImage::from_fn(WIDTH, HEIGHT, |i, j| {
+        let (x, y) = (f64::from(i) + 0.5 - 120.0, f64::from(if below { HEIGHT - 1 - j } else { j }) + 0.5);
+        let body = x.abs() <= RADIUS && (rim..=foot).contains(&y) || ellipse(x, y, foot);
+        let colour = match (ellipse(x, y, rim), body) {
+            (true, _) => [150.0, 100.0, 60.0],
+            (false, true) => [210.0, 160.0, 100.0],
+            _ => [60.0, 75.0, 80.0],
+        };
+        Rgb(colour.map(|v| (v + 12.0 * noise(j / 3 * 1000 + i / 3)) as u8))
+    });
+    Photo::from_rgb(picture).unwrap()
+}
+
+/// The near half of the rim tells the tilt, from above and from below.
+#[test]
+fn rims_tell_tilts() {
+    let tilts: Vec<f64> = tilts().collect();
+    assert!(tilts.len() == 80 && tilts.windows(2).all(|w| w[0] < w[1]));
+    for (tilt, below) in [(0.3, false), (0.45, false), (0.6, false), (0.45, true)] {
+        let found = candidates(&vessel(tilt, below), &CandidateOptions::default());
+        let axis = &found.first().expect("nothing was found").axes[0];
+        let best = (0..80).fold(0, |best, i| if axis.rims[i] > axis.rims[best] { i } else { best });
+        let (at, wanted) = (tilts[best], if below { -tilt } else { tilt });
+        assert!((at - wanted).abs() < 0.06 && axis.rims[best] > 0.4, "{wanted}: {at} {}", axis.rims[best]);
+    }
+    // Nothing speaks for a tilt of what has no flat end.
+    let (photo, _) = vase(0.0);
+    let rims = &candidates(&photo, &CandidateOptions::default())[0].axes[0].rims;
+    assert!(rims.iter().all(|r| (0.0..0.35).contains(r)), "{rims:?}");
+}

@@ -1,15 +1,20 @@
-//! The paper's figure for people (Kulkarni et al. 2014, section 4.2.1): chains with and without discriminative proposals on one photograph,
-//! log joint density against time.
+//! The paper's figure (Kulkarni et al. 2014, section 4): chains with and without discriminative proposals on one photograph, log joint
+//! density against time.
 //!
-//!     cargo run --release --example people_proposals -- examples/images/skier.jpg proposals.svg [CHAINS] [SECONDS]
+//!     cargo run --release --example proposals -- human.pcad examples/images/skier.jpg proposals.svg [CHAINS] [SECONDS] [CAMERA.json]
+//!     cargo run --release --example proposals -- lathe.pcad examples/images/table_lamp.png proposals.svg
 //!
-//! Both are `human.pcad` with the same likelihood, started from the prior, one chain a thread: with the jumps of `modes` (its search counts), and
-//! without them. Writes the figure, medians and quantiles as CSV beside it, and says when medians pass what the others end with.
+//! The same program with the same likelihood, one chain a thread: people with the jumps of `modes` (its search counts) and without them, both
+//! started from the prior; objects started from the best of 200 lathes that fill regions of the picture (finding these counts), and from the
+//! best of 200 draws from the prior, without annealing. Writes the figure, medians and quantiles as CSV beside it, and says when medians pass
+//! what the others end with.
 
 use pcadlang::Program;
 use pcadlang::infer::draws::{Column, DrawRow, Sink};
 use pcadlang::infer::{Progress, RunOptions};
 use pcadlang::lang::load;
+use pcadlang::vision::candidates::{CandidateOptions, candidates};
+use pcadlang::vision::{Limits, photo};
 use std::fmt::Write;
 use std::io;
 use std::sync::{Arc, Mutex};
@@ -53,42 +58,73 @@ impl Sink for Recorder {
     }
 }
 
-/// `human.pcad` with a plan that records every step after a short warm-up, in which steps learn their size and the search for modes, if there is
-/// one, takes the chain to a mode; with or without jumps.
-fn program(jumps: bool) -> Result<String, String> {
-    let text = load::embedded("human.pcad").ok_or("human.pcad is not shipped")?;
-    let plan = text.rfind("infer {").ok_or("human.pcad has no plan")?;
-    let text = format!(
-        "{}infer {{ warmup 40 {{ moves(); }} repeat 1000000 {{ moves(); collect log_joint(); }} }}\n",
-        &text[..plan]
-    );
-    let with = "0.10 * (1 - blind) => modes(";
-    if !text.contains(with) {
+/// A shipped program with a plan that records every step, with its proposals from the picture or without.
+fn program(name: &str, with: bool) -> Result<String, String> {
+    let text = load::embedded(name).ok_or_else(|| format!("{name} is not shipped"))?;
+    let plan = text.rfind("infer {").ok_or_else(|| format!("{name} has no plan"))?;
+    let steps = "repeat 1000000 { moves(); collect log_joint(); }";
+    // Of people, after a short warm-up, in which steps learn their size and the search for modes takes the chain to one.
+    let begin = match (name, with) {
+        ("human.pcad", _) => "warmup 40 { moves(); }",
+        ("lathe.pcad", true) => "init(best_of(200, from = outline(axes, weights, turns)));",
+        ("lathe.pcad", false) => "init(best_of(200));",
+        _ => return Err("of human.pcad and lathe.pcad it is known what their proposals are".into()),
+    };
+    let text = format!("{}infer {{ {begin} {steps} }}\n", &text[..plan]);
+    let jumps = "0.10 * (1 - blind) => modes(";
+    if name == "human.pcad" && !text.contains(jumps) {
         return Err("human.pcad has no jumps".into());
     }
-    Ok(if jumps { text } else { text.replace(with, "0 * (1 - blind) => modes(") })
+    Ok(if with { text } else { text.replace(jumps, "0 * (1 - blind) => modes(") })
 }
 
-/// The paths of so many chains.
-fn paths(image: &str, jumps: bool, chains: usize, seconds: f64) -> Result<Vec<Vec<(f64, f64)>>, String> {
+/// What is run, and on what.
+struct Job<'a> {
+    name: &'a str,
+    image: &'a str,
+    camera: Option<&'a str>,
+    chains: usize,
+    seconds: f64,
+}
+
+/// The paths of all chains, and the seconds that finding regions took.
+fn paths(job: &Job, with: bool) -> Result<Vec<Vec<(f64, f64)>>, String> {
     let said = |e: pcadlang::Error| e.to_string();
-    let model =
-        Program::parse(&program(jumps)?).and_then(|p| p.observe_file("photo", image)).and_then(Program::compile);
-    let model = model.map_err(said)?;
+    let program = Program::parse(&program(job.name, with)?).and_then(|p| p.observe_file("photo", job.image));
+    let program = program.map_err(said)?;
+    let program = match job.camera {
+        Some(path) => {
+            let text = std::fs::read_to_string(path).map_err(|e| format!("{path}: {e}"))?;
+            program.camera(pcadlang::render::Camera::from_json(&text).map_err(|e| e.to_string())?)
+        }
+        None => program,
+    };
+    let model = program.compile().map_err(said)?;
+    // Found once for all chains, and to be paid for by each.
+    let cost = if with && job.name == "lathe.pcad" { regions(job.image)? } else { 0.0 };
     let threads = std::thread::available_parallelism().map_or(1, usize::from);
     let mut all = Vec::new();
     // As many at once as there are cores, so that each has one to itself and all have the same time.
-    for first in (0..chains).step_by(threads) {
-        let shared: Vec<Arc<Mutex<Path>>> = (first..chains.min(first + threads)).map(|_| Arc::default()).collect();
+    for first in (0..job.chains).step_by(threads) {
+        let shared: Vec<Arc<Mutex<Path>>> = (first..job.chains.min(first + threads)).map(|_| Arc::default()).collect();
         let sinks = shared.iter().map(|p| Box::new(Recorder(Arc::clone(p))) as Box<dyn Sink>).collect();
-        let time = Some(Duration::from_secs_f64(seconds));
+        let time = Some(Duration::from_secs_f64(job.seconds));
         let options = RunOptions { seed: first as u64 + 1, time, ..RunOptions::default() };
         for chain in model.run_into(&options, threads, &Progress::default(), sinks).map_err(said)? {
             chain.map_err(|e| format!("{e:?}"))?;
         }
         all.extend(shared.iter().filter_map(|p| Some(std::mem::take(&mut p.lock().ok()?.points))));
     }
+    all.iter_mut().flatten().for_each(|(t, _)| *t += cost);
     Ok(all)
+}
+
+/// The seconds that finding regions in a picture takes.
+fn regions(image: &str) -> Result<f64, String> {
+    let photo = photo::load(image.as_ref(), &Limits::default()).map_err(|e| e.to_string())?;
+    let begun = Instant::now();
+    candidates(&photo, &CandidateOptions::default());
+    Ok(begun.elapsed().as_secs_f64())
 }
 
 /// Quantiles over chains at each moment; before its first draw a chain is nowhere.
@@ -147,16 +183,19 @@ fn figure(moments: &[f64], both: &[(&str, &str, Vec<[f64; 5]>)]) -> String {
 
 fn main() -> Result<(), String> {
     let args: Vec<String> = std::env::args().skip(1).collect();
-    let [image, out, rest @ ..] = &args[..] else { return Err("usage: IMG OUT.svg [CHAINS] [SECONDS]".into()) };
+    let [name, image, out, rest @ ..] = &args[..] else {
+        return Err("usage: PROGRAM IMG OUT.svg [CHAINS] [SECONDS] [CAMERA.json]".into());
+    };
     let number = |i: usize, other: f64| rest.get(i).map_or(Ok(other), |x| x.parse::<f64>().map_err(|e| e.to_string()));
     let (chains, seconds) = (number(0, 100.0)? as usize, number(1, 1.5)?);
     if chains == 0 || !(seconds > 0.01 && seconds < 1e6) {
         return Err("at least one chain and more than 0.01 seconds are needed".into());
     }
+    let job = Job { name, image, camera: rest.get(2).map(String::as_str), chains, seconds };
     let moments: Vec<f64> =
         (0..MOMENTS).map(|i| 0.01 * (seconds / 0.01).powf(i as f64 / (MOMENTS - 1) as f64)).collect();
-    let with = quantiles(&paths(image, true, chains, seconds)?, &moments);
-    let without = quantiles(&paths(image, false, chains, seconds)?, &moments);
+    let with = quantiles(&paths(&job, true)?, &moments);
+    let without = quantiles(&paths(&job, false)?, &moments);
     let mut csv = String::from(
         "seconds,with_q05,with_q25,with_q50,with_q75,with_q95,without_q05,without_q25,without_q50,without_q75,without_q95\n",
     );
@@ -167,16 +206,16 @@ fn main() -> Result<(), String> {
     let last = without.last().map_or(f64::NEG_INFINITY, |q| q[2]);
     let passes = moments.iter().zip(&with).find(|(_, q)| q[2] >= last);
     println!(
-        "median log joint after {seconds} s: {:.1} with jumps, {last:.1} without",
+        "median log joint after {seconds} s: {:.1} with proposals from the picture, {last:.1} without",
         with.last().map_or(f64::NAN, |q| q[2])
     );
     match passes {
         Some((t, _)) => {
-            println!("with jumps the median chain is there after {t:.2} s: {:.0} times sooner", seconds / t)
+            println!("with them the median chain is there after {t:.2} s: {:.0} times sooner", seconds / t)
         }
-        None => println!("with jumps the median chain does not get there"),
+        None => println!("with them the median chain does not get there"),
     }
-    let both = [("with jumps", "#1f77b4", with), ("without", "#d62728", without)];
+    let both = [("with proposals from the picture", "#1f77b4", with), ("without", "#d62728", without)];
     std::fs::write(out, figure(&moments, &both)).map_err(|e| format!("{out}: {e}"))?;
     std::fs::write(format!("{out}.csv"), csv).map_err(|e| format!("{out}.csv: {e}"))
 }
