@@ -79,7 +79,7 @@ fn proposals_beside_a_map_are_paid_for() {
            propose @f ~ mv_normal(0.5 * value(@f) - u, cov = 0.3 * identity(2));
            propose u = -u;
          }
-         infer { warmup 1000 { swapped(); } repeat 60000 { swapped(); collect s, f; } }",
+         infer { warmup 1000 { swapped(); drift(one(@**)); } repeat 90000 { swapped(); drift(one(@**)); collect s, f; } }",
         1,
         2,
     );
