@@ -13,7 +13,7 @@ const ENDS: f64 = 0.35;
 /// How far the near half is from the far one at least, pixels: nearer, it is the outline's own edge.
 const APART: f64 = 3.0;
 
-/// The tilts that [`rims`] tells of, radians: below 0 the lower end is turned towards the camera, above
+/// The tilts that `rims` of an axis tell of, radians: below 0 the lower end is turned towards the camera, above
 /// 0 the upper end.
 pub fn tilts() -> impl Iterator<Item = f64> {
     let one = |i: usize| STEP * (i + 1) as f64;
