@@ -352,6 +352,34 @@ fn the_lathe_draws_the_same_on_any_number_of_threads() {
     assert!(f.exists("one/best.obj") && f.exists("one/overlay.png") && f.exists("one/depth.npy"));
 }
 
+/// Chains that never move stay where they began: a picture of each place, and a warning that they do not draw the same.
+#[test]
+fn places_that_chains_stay_at_are_shown() {
+    let f = Folder::new("places");
+    let program = |spread: &str| {
+        format!(
+            "include \"std/scene.pcad\" as scene;
+             assume x ~ uniform(-{spread}, {spread}); observe normal(x, 9) = 0;
+             assume view = scene.render(scene.affine(translate = [x, 0, 0]) * scene.sphere(0.4));
+             infer {{ repeat 60 {{ collect x; }} }}"
+        )
+    };
+    let run = |name: &str, spread: &str| {
+        f.write(&format!("{name}.pcad"), program(spread).as_bytes());
+        f.succeeds(&["run", &format!("{name}.pcad"), "--chains", "3", "--seed", "1", "--quiet", "--out", name]);
+        let agreement: serde_json::Value = serde_json::from_str(&f.read(&format!("{name}/run.json"))).unwrap();
+        (
+            agreement["agreement"].as_f64().unwrap(),
+            f.read(&format!("{name}/summary.json")).contains("cover the same pixels"),
+        )
+    };
+    let (far, near) = (run("far", "1.5"), run("near", "0.0001"));
+    assert!(far.0 < 0.5 && far.1, "{far:?}");
+    assert!(near.0 > 0.95 && !near.1, "{near:?}");
+    let sheet = image::open(f.path().join("far/modes.png")).unwrap();
+    assert!(sheet.width() > 3 * 384 && sheet.width() < 3 * 400, "{}", sheet.width());
+}
+
 #[test]
 fn sheets_of_the_prior() {
     let f = Folder::new("sheets");

@@ -27,7 +27,7 @@ pub fn best_of_each(modes: &[Mode], best: &BestSoFar) -> Vec<(String, Arc<BestSt
     };
     let said = |(i, m): (usize, &Mode)| {
         let best = state(m)?;
-        let text = format!("place {}: {} of {chains} chains, best {:.0}", i + 1, m.chains.len(), best.log_joint);
+        let text = format!("{}: {} of {chains}, {:.0}", i + 1, m.chains.len(), best.log_joint);
         Some((text, best))
     };
     modes.iter().take(SHOWN).enumerate().filter_map(said).collect()
@@ -61,6 +61,9 @@ pub fn show_places(
     let sheet = captioned_sheet(&pictures, COLUMNS, &captions);
     let bytes = png(&sheet).map_err(|e| plain(e.to_string()))?;
     write(dir, "modes.png", &bytes)?;
-    shown.pictures.push(("the places that the chains stay at, the best state of each", bytes));
+    shown.pictures.push((
+        "the places that the chains stay at: how many chains, the log joint density of their best state",
+        bytes,
+    ));
     Ok(())
 }
