@@ -13,11 +13,15 @@ const ENDS: f64 = 0.35;
 /// How far the near half is from the far one at least, pixels: nearer, it is the outline's own edge.
 const APART: f64 = 3.0;
 
-/// The tilts that `rims` of an axis tell of, radians: below 0 the lower end is turned towards the camera, above
-/// 0 the upper end.
+/// The tilts that `rims` of an axis tell of, radians: below 0 the lower end is turned towards the
+/// camera, above 0 the upper end.
 pub fn tilts() -> impl Iterator<Item = f64> {
-    let one = |i: usize| STEP * (i + 1) as f64;
-    (0..TRIED).rev().map(move |i| -one(i)).chain((0..TRIED).map(one))
+    (0..TRIED).rev().map(|i| -tilt(i)).chain((0..TRIED).map(tilt))
+}
+
+/// One of the tilts that are tried at an end.
+fn tilt(i: usize) -> f64 {
+    STEP * (i + 1) as f64
 }
 
 /// How much speaks for each tilt of an end, 0 to 1: how much more of an edge the near half of the
@@ -27,7 +31,7 @@ pub fn tilts() -> impl Iterator<Item = f64> {
 pub fn rims(picture: &Picture, length: f64, width: impl Fn(f64) -> f64, at: impl Fn(f64, f64) -> [f64; 2]) -> Vec<f64> {
     let mut least = f64::INFINITY;
     let support = |i: usize| {
-        let edge = near_half(picture, libm::sin(STEP * (i + 1) as f64), length, &width, &at);
+        let edge = near_half(picture, libm::sin(tilt(i)), length, &width, &at);
         let Some(edge) = edge else { return 0.0 };
         least = least.min(edge);
         edge - least
@@ -36,8 +40,8 @@ pub fn rims(picture: &Picture, length: f64, width: impl Fn(f64) -> f64, at: impl
 }
 
 /// How much of an edge the near half of an ellipse is, 0 to 1: of one whose far half ends where the
-/// axis does, with the half-width there and `flat` times as high as wide. `None` where it is not apart from the far half, or not
-/// within the object.
+/// axis does, with the half-width there and `flat` times as high as wide. `None` where it is not
+/// apart from the far half, or not within the object.
 fn near_half(
     picture: &Picture,
     flat: f64,

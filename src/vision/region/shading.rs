@@ -94,7 +94,8 @@ impl Sums {
     }
 }
 
-/// From sums of products of (1, terms, brightness), of which those above the diagonal count. The constant has a flat prior, so one degree of freedom goes to it.
+/// From sums of products of (1, terms, brightness), of which those above the diagonal count. The constant has a flat prior, so
+/// one degree of freedom goes to it.
 fn from_products(products: &[[f64; ALL]; ALL]) -> f64 {
     let n = products[0][0];
     if n < 2.0 {
