@@ -20,6 +20,21 @@ pub struct Profile {
     pub r: Vec<f64>,
 }
 
+/// The inside of a vessel. From a number, a wall of that thickness with a floor as thick.
+#[derive(Clone, Copy, Debug, Default, PartialEq)]
+pub struct Wall<T = f64> {
+    /// The thickness of the wall, scene units; 0 for a full body.
+    pub thickness: T,
+    /// How high above the lower end the floor is, scene units; as the wall is thick at least. What fills a vessel raises it.
+    pub floor: T,
+}
+
+impl From<f64> for Wall {
+    fn from(thickness: f64) -> Wall {
+        Wall { thickness, floor: 0.0 }
+    }
+}
+
 /// Which ends of an object of revolution are closed.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 pub enum Caps {
@@ -43,9 +58,10 @@ const LARGEST: f64 = 1e6;
 pub(super) const SMALLEST: f64 = 1e-30;
 
 /// Sweeps profiles, stacked in the order given, round the y axis. A step from one to the next is closed by a ring. With
-/// `thickness` > 0 it is a vessel open at the top: an outer wall, a rim, an inner wall `thickness` further in (at 2 % of the
-/// radius at least, measured along the radius only), and a floor of that thickness (half the height at most) where `caps`
-/// closes the bottom; without, `caps` says which ends get a disc.
+/// a wall that has a thickness it is a vessel open at the top: an outer wall, a rim, an inner wall so much further in (at 2 %
+/// of the radius at least, measured along the radius only), and where `caps` closes the bottom a floor: as high as the wall is
+/// thick (half the height at most), or higher as `wall` says (95 % of the height at most). Without, `caps` says which ends get
+/// a disc.
 ///
 /// A profile that begins or ends at the axis (below 1e-6 of the object's size) is closed there whatever `caps` says, except
 /// at the top of a vessel, which keeps a mouth. Radii at the axis between the ends make a thin neck.
@@ -60,14 +76,14 @@ pub(super) const SMALLEST: f64 = 1e-30;
 /// [`GeomError::Domain`] if a profile has fewer than 2 points, unequal numbers of heights and radii, numbers that are not
 /// finite or above 1e6, heights that decrease, negative radii; if there are no profiles or more than 1000, more than 4096
 /// points, fewer than 3 or more than 1024 sides, more than five million triangles; if the object has no extent.
-pub fn lathe(parts: &[Profile], sides: u32, thickness: f64, caps: Caps) -> Result<Mesh, GeomError> {
-    turned(parts, sides, thickness, caps).map(|(mesh, _)| mesh)
+pub fn lathe(parts: &[Profile], sides: u32, wall: impl Into<Wall>, caps: Caps) -> Result<Mesh, GeomError> {
+    turned(parts, sides, wall.into(), caps).map(|(mesh, _)| mesh)
 }
 
 /// The mesh, and what it was made of.
-fn turned(parts: &[Profile], sides: u32, thickness: f64, caps: Caps) -> Result<(Mesh, Turned), GeomError> {
-    check(parts, sides, thickness)?;
-    let Layout { strips, closed } = layout(parts, caps, thickness, |x| x)?;
+fn turned(parts: &[Profile], sides: u32, wall: Wall, caps: Caps) -> Result<(Mesh, Turned), GeomError> {
+    check(parts, sides, wall)?;
+    let Layout { strips, closed } = layout(parts, caps, wall, |x| x)?;
     let count = parts.len() as u16 + 5;
     Ok((revolve(&strips, sides, closed, count), Turned::new(strips, sides, closed, count)))
 }
@@ -77,8 +93,8 @@ impl Solid {
     ///
     /// # Errors
     /// As [`lathe`].
-    pub fn lathe(parts: &[Profile], sides: u32, thickness: f64, caps: Caps) -> Result<Solid, GeomError> {
-        turned(parts, sides, thickness, caps).map(|(mesh, turned)| Solid::detailed(mesh, Detail::turned(turned)))
+    pub fn lathe(parts: &[Profile], sides: u32, wall: impl Into<Wall>, caps: Caps) -> Result<Solid, GeomError> {
+        turned(parts, sides, wall.into(), caps).map(|(mesh, turned)| Solid::detailed(mesh, Detail::turned(turned)))
     }
 }
 
@@ -87,8 +103,8 @@ impl Solid {
 pub struct LatheGradient {
     /// By the heights and radii of each profile.
     pub profiles: Vec<Profile>,
-    /// By the thickness.
-    pub thickness: f64,
+    /// By the thickness of the wall and the height of the floor.
+    pub wall: Wall,
 }
 
 /// The vector-Jacobian product of [`lathe`]: from the derivatives of something by the mesh's vertices, in order. Which points
@@ -99,13 +115,14 @@ pub struct LatheGradient {
 pub fn pull_lathe(
     parts: &[Profile],
     sides: u32,
-    thickness: f64,
+    wall: impl Into<Wall>,
     caps: Caps,
     by_vertex: &[DVec3],
 ) -> Result<LatheGradient, GeomError> {
-    check(parts, sides, thickness)?;
+    let wall = wall.into();
+    check(parts, sides, wall)?;
     let tape = Tape::default();
-    let wall = tape.variable(thickness);
+    let wall = Wall { thickness: tape.variable(wall.thickness), floor: tape.variable(wall.floor) };
     let mut inputs = Vec::new();
     let number = |x| {
         let v = tape.variable(x);
@@ -118,11 +135,12 @@ pub fn pull_lathe(
     let slopes = tape.reverse(outputs);
     let mut numbers = inputs.iter().map(|v| slopes[v.index()]);
     let mut next = || numbers.next().unwrap_or(0.0);
+    let wall = Wall { thickness: slopes[wall.thickness.index()], floor: slopes[wall.floor.index()] };
     let one = |p: &Profile| {
         let (r, y) = p.r.iter().map(|_| (next(), next())).unzip();
         Profile { y, r }
     };
-    Ok(LatheGradient { profiles: parts.iter().map(one).collect(), thickness: slopes[wall.index()] })
+    Ok(LatheGradient { profiles: parts.iter().map(one).collect(), wall })
 }
 
 /// The path of a lathe.
@@ -136,7 +154,7 @@ struct Layout<T> {
 fn layout<T: Real>(
     parts: &[Profile],
     caps: Caps,
-    thickness: T,
+    wall: Wall<T>,
     number: impl FnMut(f64) -> T,
 ) -> Result<Layout<T>, GeomError> {
     let flat = || GeomError::domain("lathe: the object has no extent");
@@ -144,6 +162,7 @@ fn layout<T: Real>(
     let n = parts.len() as u16;
     let (ring, bottom_disc, rim, inner, floor) = (n, n + 1, n + 2, n + 3, n + 4);
     let OuterPath { first, last, mut strips } = OuterPath::new(parts, &tolerance, ring, number).ok_or_else(flat)?;
+    let thickness = wall.thickness;
     let axis = thickness.constant(0.0);
     let hollow = thickness.value() > 0.0;
     let bottom_pole = tolerance.is_tip(first.0.value()) && !strips.is_empty();
@@ -156,7 +175,7 @@ fn layout<T: Real>(
     let mut closed = false;
     if hollow {
         let down_to = if closed_bottom {
-            floor_height(first.1, last.1, thickness)
+            floor_height(first.1, last.1, wall)
         } else {
             thickness.constant(f64::NEG_INFINITY)
         };
@@ -188,7 +207,7 @@ fn layout<T: Real>(
     Ok(Layout { strips: all, closed })
 }
 
-fn check(parts: &[Profile], sides: u32, thickness: f64) -> Result<(), GeomError> {
+fn check(parts: &[Profile], sides: u32, wall: Wall) -> Result<(), GeomError> {
     let wrong = |message: String| Err(GeomError::domain(format!("lathe: {message}")));
     if parts.is_empty() {
         return wrong("there is no profile".into());
@@ -203,10 +222,12 @@ fn check(parts: &[Profile], sides: u32, thickness: f64) -> Result<(), GeomError>
     if !(3..=1024).contains(&sides) {
         return wrong(format!("3 to 1024 sides, got {sides}"));
     }
-    if !(0.0..=LARGEST).contains(&thickness) {
-        return wrong(format!("the thickness must be from 0 to {LARGEST}, got {thickness}"));
+    for (what, x) in [("thickness", wall.thickness), ("floor", wall.floor)] {
+        if !(0.0..=LARGEST).contains(&x) {
+            return wrong(format!("the {what} must be from 0 to {LARGEST}, got {x}"));
+        }
     }
-    let walls = if thickness > 0.0 { 2 } else { 1 };
+    let walls = if wall.thickness > 0.0 { 2 } else { 1 };
     let triangles = 2 * (walls * points + 3) * sides as usize;
     if triangles > MOST_TRIANGLES {
         return wrong(format!(

@@ -105,6 +105,20 @@ fn topology_is_shared_and_the_cache_changes_nothing() {
 }
 
 #[test]
+fn a_floor_is_as_high_as_it_is_raised() {
+    let cup = profile(&[(1.0, 0.0), (1.0, 2.0)]);
+    for (floor, high) in [(0.0, 0.1), (0.05, 0.1), (0.7, 0.7), (5.0, 1.9)] {
+        let m = lathe(from_ref(&cup), 64, Wall { thickness: 0.1, floor }, Caps::Bottom).unwrap();
+        assert_closed(&m, 2);
+        assert_outward(&m);
+        let full = std::f64::consts::PI * (2.0 - 0.81 * (2.0 - high)) * polygon(64.0);
+        assert!((volume(&m) - full).abs() < 1e-5, "{floor}: {} {full}", volume(&m));
+    }
+    let wrong = lathe(from_ref(&cup), 64, Wall { thickness: 0.1, floor: -1.0 }, Caps::Bottom).unwrap_err();
+    assert_eq!(wrong.to_string(), "lathe: the floor must be from 0 to 1000000, got -1");
+}
+
+#[test]
 fn impossible_profiles_are_errors() {
     let fails =
         |parts: &[Profile], sides, thickness| lathe(parts, sides, thickness, Caps::Both).unwrap_err().to_string();

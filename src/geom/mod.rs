@@ -30,7 +30,7 @@ pub use detail::{Coarse, Detail};
 pub use error::GeomError;
 pub use frame::{FileFrame, UpAxis};
 pub use landmark::Landmark;
-pub use lathe::{Caps, LatheGradient, Profile, lathe, pull_lathe};
+pub use lathe::{Caps, LatheGradient, Profile, Wall, lathe, pull_lathe};
 pub use mesh::{Edge, Edges, Mesh, NO_FACE, Topology};
 pub use patches::Patches;
 pub(crate) use patches::Run;

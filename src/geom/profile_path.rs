@@ -3,7 +3,7 @@
 //! Works in the half plane (r, y), knows nothing of triangles. Generic in its numbers, so that a tape gives derivatives. Invariant: neighbouring points differ by more than the
 //! tolerance, so that no triangle collapses in single precision, and each strip begins where the one before ends.
 
-use super::lathe::{Profile, SMALLEST};
+use super::lathe::{Profile, SMALLEST, Wall};
 use super::real::Real;
 use super::revolve::Strip;
 
@@ -16,6 +16,8 @@ const DOME_SLOPE: f64 = 0.363_970_234_266_202;
 const TIP: f64 = 1e-6;
 /// An inner wall keeps at least this share of the outer radius.
 const LEAST_BORE: f64 = 0.02;
+/// The share of the height that a floor reaches at most.
+const MOST_FILLED: f64 = 0.95;
 
 /// How near points may come, from the size of an object.
 #[derive(Clone, Copy, Debug)]
@@ -142,10 +144,12 @@ impl<T: Real> Strip<T> {
     }
 }
 
-/// The height of the floor inside.
-pub(super) fn floor_height<T: Real>(bottom: T, top: T, thickness: T) -> T {
-    let most = (top - bottom) * top.constant(0.5);
-    bottom + if thickness.value() < most.value() { thickness } else { most }
+/// The height of the floor inside: what it is raised to, or as the wall is thick.
+pub(super) fn floor_height<T: Real>(bottom: T, top: T, wall: Wall<T>) -> T {
+    let share = |s: f64| (top - bottom) * top.constant(s);
+    let least = |a: T, b: T| if a.value() < b.value() { a } else { b };
+    let (thick, raised) = (least(wall.thickness, share(0.5)), least(wall.floor, share(MOST_FILLED)));
+    bottom + if thick.value() < raised.value() { raised } else { thick }
 }
 
 /// The inner wall from the rim, inside `last`, down to a height: its strips, its first and its last point. It has creases

@@ -5,7 +5,7 @@ use super::{CAMERA, CameraValue, IMAGE, ImageValue, native};
 use crate::lang::builtins::{Row, Type, arg, opt};
 use crate::lang::error::{Fault, FaultKind};
 use crate::lang::value::Value;
-use crate::render::Camera;
+use crate::render::{Camera, Projection};
 use crate::vision::candidates::{Axis, Candidate, CandidateOptions, candidates, tilts};
 use glam::DVec3;
 use std::sync::Arc;
@@ -21,9 +21,9 @@ pub(super) const TABLE: &[Row] = &[native(
     ],
     Type::Array,
     "Regions of a photograph that may be objects of revolution, the likeliest first. Each is a record: `score`; `mask`; `axes`, one or two \
-     records, the more symmetric first: `symmetry`, 0 to 1; the ends `foot` and `top`, where the plane through the origin that faces the \
-     camera is seen there; their distance `length`; the unit vectors `along`, from foot to top, and `toward` the camera; `widths`, 24 half widths \
-     from foot to top; `tilts`, 80 angles by which the axis may be turned towards the camera, radians, and `rims`, how much speaks for each of \
+     records, the more symmetric first: `symmetry`, 0 to 1; the ends `foot` and `top`, in the plane that faces the eye at about the distance of \
+     the origin; their distance `length`; the unit vectors `along`, from foot to top, and `toward` the eye, which is at `distance`; `widths`, 24 half \
+     widths from foot to top; `tilts`, 80 angles by which the axis may be turned towards the camera, radians, and `rims`, how much speaks for each of \
      them, 0 to 1: whether an end, if it is flat, is seen as an ellipse so high. Lengths are in scene units. A function of picture and camera alone, found once.",
     |a| {
         if matches!(a.values.first(), Some(Value::Unit)) {
@@ -59,24 +59,77 @@ fn value(c: &Candidate, camera: &Camera, scale: [f64; 2]) -> Value {
 }
 
 fn axis(a: &Axis, camera: &Camera, scale: [f64; 2]) -> Value {
-    // The plane through the origin that faces the camera.
+    // Where the middle is seen at the depth of the origin, and the plane through it that faces the eye.
     let depth = (-camera.eye).dot(camera.forward).max(Camera::NEAR);
-    let there = |[x, y]: [f64; 2]| camera.unproject(x * scale[0], y * scale[1], depth);
+    let at = |[x, y]: [f64; 2], depth| camera.unproject(x * scale[0], y * scale[1], depth);
+    let middle = at([0.5 * (a.foot[0] + a.top[0]), 0.5 * (a.foot[1] + a.top[1])], depth);
+    let (toward, distance) = match camera.projection {
+        Projection::Pinhole { .. } => ((camera.eye - middle).normalize_or(-camera.forward), camera.eye.distance(middle)),
+        Projection::Orthographic { .. } => (-camera.forward, f64::INFINITY),
+    };
+    let there = |pixel: [f64; 2]| {
+        let (near, far) = (at(pixel, 0.0), at(pixel, depth));
+        let ray = far - near;
+        near + ray * ((middle - near).dot(toward) / ray.dot(toward))
+    };
     let (foot, top) = (there(a.foot), there(a.top));
-    let length = foot.distance(top);
-    let along = (top - foot).normalize_or(camera.up);
-    let pixels = f64::hypot(a.top[0] - a.foot[0], a.top[1] - a.foot[1]).max(1e-9);
-    let widths = a.widths.iter().map(|w| w / pixels * length).collect::<Vec<_>>();
+    let [dx, dy] = [a.top[0] - a.foot[0], a.top[1] - a.foot[1]];
+    let pixels = f64::hypot(dx, dy).max(1e-9);
+    let last = a.widths.len() as f64;
+    let width = |(i, w): (usize, &f64)| {
+        let (t, across) = ((i as f64 + 0.5) / last, [-dy / pixels * w, dx / pixels * w]);
+        let side = |s: f64| there([a.foot[0] + t * dx + s * across[0], a.foot[1] + t * dy + s * across[1]]);
+        0.5 * side(1.0).distance(side(-1.0))
+    };
     let vector = |v: DVec3| Value::array(v.to_array().to_vec());
     Value::record([
         ("symmetry", Value::Num(a.symmetry)),
         ("foot", vector(foot)),
         ("top", vector(top)),
-        ("length", Value::Num(length)),
-        ("along", vector(along)),
-        ("toward", vector(-camera.forward)),
-        ("widths", Value::array(widths)),
+        ("length", Value::Num(foot.distance(top))),
+        ("along", vector((top - foot).normalize_or(camera.up))),
+        ("toward", vector(toward)),
+        ("distance", Value::Num(distance)),
+        ("widths", Value::array(a.widths.iter().enumerate().map(width).collect::<Vec<_>>())),
         ("tilts", Value::array(tilts().collect::<Vec<_>>())),
         ("rims", Value::array(a.rims.clone())),
     ])
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    /// A disc that faces the eye, far from the middle of the picture, is as long as it is wide in every direction.
+    #[test]
+    fn lengths_are_those_of_a_plane_that_faces_the_eye() {
+        let camera = Camera::default_for(256, 256);
+        let (middle, radius) = (DVec3::new(1.7, -1.4, 0.0), 0.3);
+        let toward = (camera.eye - middle).normalize();
+        let across = toward.cross(DVec3::Y).normalize();
+        for i in 0..6 {
+            let angle = f64::from(i) * 0.5;
+            let along = libm::cos(angle) * across + libm::sin(angle) * toward.cross(across);
+            let pixel = |by: f64| {
+                let (x, y, _) = camera.project(middle + by * radius * along);
+                [x, y]
+            };
+            let (foot, top) = (pixel(-1.0), pixel(1.0));
+            let (x, y, _) = camera.project(middle + radius * toward.cross(along));
+            let [ux, uy] = [top[0] - foot[0], top[1] - foot[1]];
+            let (mx, my) = (0.5 * (foot[0] + top[0]), 0.5 * (foot[1] + top[1]));
+            let width = ((x - mx) * uy - (y - my) * ux).abs() / f64::hypot(ux, uy);
+            let seen = Axis { symmetry: 1.0, foot, top, widths: vec![width], rims: Vec::new() };
+            let made = axis(&seen, &camera, [1.0, 1.0]);
+            let Value::Record(fields) = &made else { panic!("no record") };
+            let number = |name: &str| match fields.get(name) {
+                Some(Value::Num(x)) => *x,
+                Some(Value::Array(xs)) => xs[0],
+                _ => panic!("{name}"),
+            };
+            assert!((number("length") / (2.0 * radius) - 1.0).abs() < 0.004, "{i}: {}", number("length"));
+            assert!((number("widths") / radius - 1.0).abs() < 0.012, "{i}: {}", number("widths"));
+            assert!((number("distance") - camera.eye.distance(middle)).abs() < 0.02);
+        }
+    }
 }

@@ -21,13 +21,14 @@ fn surface<'a>(made: &'a Value, by: &Adjoint) -> Option<(&'a Mesh, Vec<DVec3>)> 
 /// Of `scene.lathe`.
 pub(super) fn lathe(a: &Args, made: &Value, by: &Adjoint) -> Option<Pulled> {
     let Some((_, by_vertex)) = surface(made, by) else { return Some(Pulled::new()) };
-    let Turned { profiles, sides, thickness, caps } = turned(a).ok()?;
-    let g = pull_lathe(&profiles, sides, thickness, caps, &by_vertex).ok()?;
+    let Turned { profiles, sides, wall, caps } = turned(a).ok()?;
+    let g = pull_lathe(&profiles, sides, wall, caps, &by_vertex).ok()?;
     let parts = match a.get(0) {
         Value::List(all) => Adjoint::List(all.iter().zip(&g.profiles).map(|(v, g)| profile(v, g)).collect()),
         one => g.profiles.first().map_or(Adjoint::Zero, |g| profile(one, g)),
     };
-    Some(smallvec![parts, Adjoint::Zero, Adjoint::Num(g.thickness)])
+    let [thickness, floor] = [g.wall.thickness, g.wall.floor].map(Adjoint::Num);
+    Some(smallvec![parts, Adjoint::Zero, thickness, Adjoint::Zero, floor])
 }
 
 /// In the shape of a profile's record.

@@ -1,7 +1,7 @@
 //! Shapes and placements.
 
 use super::{AFFINE, AffineValue, SOLID, SolidValue, fault, native, shape_pulls};
-use crate::geom::{Affine, Caps, Landmark, Profile, Solid, cuboid};
+use crate::geom::{Affine, Caps, Landmark, Profile, Solid, Wall, cuboid};
 use crate::lang::builtins::{Args, Row, Type, arg, opt};
 use crate::lang::error::{Fault, FaultKind};
 use crate::lang::value::Value;
@@ -24,12 +24,14 @@ pub(super) const TABLE: &[Row] = &[
             opt("thickness", Type::Num, "0", "Of the wall, for a vessel open at the top; 0 for a full body.")
                 .unit("scene units"),
             opt("caps", Type::Str, "\"both\"", "Which ends are closed: \"both\", \"bottom\", \"top\" or \"none\"."),
+            opt("floor", Type::Num, "0", "How high a vessel's floor, or what fills it, is above the lower end: as its wall is thick at least.")
+                .unit("scene units"),
         ],
         SOLID,
         "Profiles stacked and swept round the y axis; a step from one to the next is closed by a ring.",
         |a| {
-            let Turned { profiles, sides, thickness, caps } = turned(a)?;
-            Solid::lathe(&profiles, sides, thickness, caps).map(solid).map_err(fault)
+            let Turned { profiles, sides, wall, caps } = turned(a)?;
+            Solid::lathe(&profiles, sides, wall, caps).map(solid).map_err(fault)
         },
     )
     .pull(shape_pulls::lathe),
@@ -172,7 +174,7 @@ pub(super) fn vector_of(v: &Value) -> Option<DVec3> {
 pub(super) struct Turned {
     pub profiles: Vec<Profile>,
     pub sides: u32,
-    pub thickness: f64,
+    pub wall: Wall,
     pub caps: Caps,
 }
 
@@ -185,7 +187,8 @@ pub(super) fn turned(a: &Args) -> Result<Turned, Fault> {
         "none" => Caps::None,
         _ => Caps::Both,
     };
-    Ok(Turned { profiles, sides, thickness: a.num_or(2, 0.0)?, caps })
+    let wall = Wall { thickness: a.num_or(2, 0.0)?, floor: a.num_or(4, 0.0)? };
+    Ok(Turned { profiles, sides, wall, caps })
 }
 
 /// One profile or an array of them.

@@ -290,6 +290,7 @@ fn cases() -> Vec<E> {
         lathe(lower(), 0.1, "bottom"),
         lathe(list(&[lower(), upper()]), 0.12, "both"),
         lathe(list(&[lower(), upper()]), 0.15, "none"),
+        Call("scene.lathe", vec![By(lower()), whole(7.0), by(0.1), Fixed("both".into()), by(0.45)]),
         Call("scene.centred", vec![Call("*", vec![at(0.3), block()]), Fixed(false.into())]),
         Call("scene.centred", vec![Call("*", vec![at(0.3), ball()]), Fixed(true.into())]),
     ]);
