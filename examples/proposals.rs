@@ -66,7 +66,7 @@ fn program(name: &str, with: bool) -> Result<String, String> {
     // Of people, after a short warm-up, in which steps learn their size and the search for modes takes the chain to one.
     let begin = match (name, with) {
         ("human.pcad", _) => "warmup 40 { moves(); }",
-        ("lathe.pcad", true) => "init(best_of(200, from = outline(axes, weights, turns)));",
+        ("lathe.pcad", true) => "init(best_of(200, from = outline(axes, weights, tilted)));",
         ("lathe.pcad", false) => "init(best_of(200));",
         _ => return Err("of human.pcad and lathe.pcad it is known what their proposals are".into()),
     };
