@@ -174,11 +174,8 @@ fn layout<T: Real>(
     let mut after = Vec::new();
     let mut closed = false;
     if hollow {
-        let down_to = if closed_bottom {
-            floor_height(first.1, last.1, wall)
-        } else {
-            thickness.constant(f64::NEG_INFINITY)
-        };
+        let down_to =
+            if closed_bottom { floor_height(first.1, last.1, wall) } else { thickness.constant(f64::NEG_INFINITY) };
         let (walls, [start, end]) = inner_wall(&strips, last, thickness, down_to, &tolerance, inner);
         after.push(Strip { points: vec![last, start], parts: vec![rim], blend: false });
         after.extend(walls);

@@ -64,7 +64,9 @@ fn axis(a: &Axis, camera: &Camera, scale: [f64; 2]) -> Value {
     let at = |[x, y]: [f64; 2], depth| camera.unproject(x * scale[0], y * scale[1], depth);
     let middle = at([0.5 * (a.foot[0] + a.top[0]), 0.5 * (a.foot[1] + a.top[1])], depth);
     let (toward, distance) = match camera.projection {
-        Projection::Pinhole { .. } => ((camera.eye - middle).normalize_or(-camera.forward), camera.eye.distance(middle)),
+        Projection::Pinhole { .. } => {
+            ((camera.eye - middle).normalize_or(-camera.forward), camera.eye.distance(middle))
+        }
         Projection::Orthographic { .. } => (-camera.forward, f64::INFINITY),
     };
     let there = |pixel: [f64; 2]| {

@@ -24,8 +24,13 @@ pub(super) const TABLE: &[Row] = &[
             opt("thickness", Type::Num, "0", "Of the wall, for a vessel open at the top; 0 for a full body.")
                 .unit("scene units"),
             opt("caps", Type::Str, "\"both\"", "Which ends are closed: \"both\", \"bottom\", \"top\" or \"none\"."),
-            opt("floor", Type::Num, "0", "How high a vessel's floor, or what fills it, is above the lower end: as its wall is thick at least.")
-                .unit("scene units"),
+            opt(
+                "floor",
+                Type::Num,
+                "0",
+                "How high a vessel's floor, or what fills it, is above the lower end: as its wall is thick at least.",
+            )
+            .unit("scene units"),
         ],
         SOLID,
         "Profiles stacked and swept round the y axis; a step from one to the next is closed by a ring.",
