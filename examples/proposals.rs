@@ -65,9 +65,13 @@ fn program(name: &str, with: bool) -> Result<String, String> {
     let steps = "repeat 1000000 { moves(); collect log_joint(); }";
     // Of people, after a short warm-up, in which steps learn their size and the search for modes takes the chain to one.
     let begin = match (name, with) {
-        ("human.pcad", _) => "warmup 40 { moves(); }",
-        ("lathe.pcad", true) => "init(best_of(200, from = outline(axes, weights, tilted)));",
-        ("lathe.pcad", false) => "init(best_of(200));",
+        ("human.pcad", _) => "warmup 40 { moves(); }".to_owned(),
+        ("lathe.pcad", true) => {
+            let from = text[plan..].split_once("from = ").and_then(|(_, t)| t.split_once("));"));
+            let (from, _) = from.ok_or("lathe.pcad has no starts")?;
+            format!("init(best_of(200, from = {from}));")
+        }
+        ("lathe.pcad", false) => "init(best_of(200));".to_owned(),
         _ => return Err("of human.pcad and lathe.pcad it is known what their proposals are".into()),
     };
     let text = format!("{}infer {{ {begin} {steps} }}\n", &text[..plan]);

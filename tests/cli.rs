@@ -352,6 +352,43 @@ fn the_lathe_draws_the_same_on_any_number_of_threads() {
     assert!(f.exists("one/best.obj") && f.exists("one/overlay.png") && f.exists("one/depth.npy"));
 }
 
+/// A wide cup seen from above in perspective: where the starts of the shipped program have its tilt, they have its height and
+/// place, too.
+#[test]
+fn starts_of_the_lathe_are_seen_in_perspective() {
+    let f = Folder::new("starts");
+    let cup = "include \"std/scene.pcad\" as scene;
+        assume x ~ normal(0, 1); observe normal(x, 1) = 0;
+        let cup = scene.lathe({ y: [0, 0.9], r: [1.1, 1.1] }, thickness = 0.05);
+        assume view = scene.render(scene.affine(translate = [0.3, 0.2, 0], rotate = [deg(25), 0, 0]) * scene.centred(cup));
+        infer { repeat 20 { mh(@x); collect x; } }";
+    f.write("cup.pcad", cup);
+    f.succeeds(&["run", "cup.pcad", "--chains", "1", "--quiet", "--out", "cup"]);
+    let text = pcadlang::lang::load::embedded("lathe.pcad").unwrap();
+    let (model, plan) = text.split_once("infer {").unwrap();
+    let (from, _) = plan.split_once("from = ").unwrap().1.split_once("));").unwrap();
+    let starts = format!("infer {{ init(best_of(1, from = {from})); collect H, S_L.axis, S_L.translate; }}");
+    f.write("starts.pcad", format!("{model}{starts}"));
+    f.succeeds(&["run", "starts.pcad", "--observe", "cup/mask.png", "--chains", "100", "--quiet", "--out", "starts"]);
+    let mut near = Vec::new();
+    for chain in draws(&f, "starts", 100) {
+        let (names, row) = chain.split_once('\n').unwrap();
+        let number = |name: &str| -> f64 {
+            let at = names.split(',').position(|n| n == name).unwrap_or_else(|| panic!("{names}"));
+            row.trim().split(',').nth(at).unwrap().parse().unwrap()
+        };
+        if (number("S_L/axis/z").asin() - 25f64.to_radians()).abs() < 0.07 {
+            near.push((number("H"), number("S_L/translate/y")));
+        }
+    }
+    assert!(near.len() >= 5, "{near:?}");
+    near.sort_by(|a, b| a.0.total_cmp(&b.0));
+    let height = near[near.len() / 2].0;
+    near.sort_by(|a, b| a.1.total_cmp(&b.1));
+    let y = near[near.len() / 2].1;
+    assert!((height - 0.9).abs() < 0.15 && (y - 0.2).abs() < 0.05, "{height} {y} {near:?}");
+}
+
 /// Chains that never move stay where they began: a picture of each place, and a warning that they do not draw the same.
 #[test]
 fn places_that_chains_stay_at_are_shown() {
