@@ -389,10 +389,41 @@ fn starts_of_the_lathe_are_seen_in_perspective() {
     assert!((height - 0.9).abs() < 0.15 && (y - 0.2).abs() < 0.05, "{height} {y} {near:?}");
 }
 
-/// Chains that never move stay where they began: a picture of each place, and a warning that they do not draw the same.
+/// Chains that cannot leave their mode: each mode has the probability of its mass, however many chains fell there, and
+/// `keypoints.json` weighs it by that.
 #[test]
-fn places_that_chains_stay_at_are_shown() {
-    let f = Folder::new("places");
+fn modes_have_their_probabilities() {
+    let f = Folder::new("probabilities");
+    let program = "include \"std/scene.pcad\" as scene;
+        assume far ~ flip(0.8);
+        assume x ~ normal(if far { 1 } else { -1 }, 0.1);
+        let ball = scene.landmarks(scene.sphere(0.3), { nose: [0, 0, 0] });
+        assume view = scene.render(scene.affine(translate = [x, 0, 0]) * ball);
+        infer { warmup 200 { drift(@x); } repeat 1500 { drift(@x); collect x, far; } }";
+    f.write("two.pcad", program.as_bytes());
+    let said = f.succeeds(&["run", "two.pcad", "--chains", "6", "--seed", "4", "--quiet", "--out", "two"]);
+    assert!(
+        said.out.contains("the chains are in 2 different modes") && said.out.contains("probability"),
+        "{}",
+        said.out
+    );
+    let summary: serde_json::Value = serde_json::from_str(&f.read("two/summary.json")).unwrap();
+    let modes = summary["modes"].as_array().unwrap();
+    let far = |m: &serde_json::Value| m["quantities"]["far"][0].as_f64().unwrap();
+    assert_eq!((modes.len(), far(&modes[0]), far(&modes[1])), (2, 1.0, 0.0), "the most probable first");
+    let probability = modes[0]["probability"].as_f64().unwrap();
+    assert!((probability - 0.8).abs() < 0.03, "{probability}");
+    assert!((modes[1]["log_evidence"][0].as_f64().unwrap() - 0.2f64.ln()).abs() < 0.2, "{}", modes[1]);
+    assert!((modes[0]["share"].as_f64().unwrap() - 0.8).abs() > 0.1, "chains fell otherwise: {}", modes[0]["share"]);
+    let keypoints: serde_json::Value = serde_json::from_str(&f.read("two/keypoints.json")).unwrap();
+    let x = keypoints["scene"]["nose"][0].as_f64().unwrap();
+    assert!((x - (2.0 * probability - 1.0)).abs() < 0.03, "{x} {probability}");
+}
+
+/// Chains that never move stay where they began: a picture of each mode, and a warning that they do not draw the same.
+#[test]
+fn modes_that_chains_stay_in_are_shown() {
+    let f = Folder::new("modes");
     let program = |spread: &str| {
         format!(
             "include \"std/scene.pcad\" as scene;

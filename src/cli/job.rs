@@ -10,7 +10,7 @@ use super::progress::{self, Ending};
 use super::{Failure, edges, files, given, people, plain};
 use pcadlang::bank::BankFiles;
 use pcadlang::infer::draws::{KernelStats, Sink, SiteStats};
-use pcadlang::infer::{BestSoFar, BestState, ChainResult, Progress, Watch, Watches};
+use pcadlang::infer::{BestSoFar, BestState, ChainResult, Evidence, Progress, Watch, Watches};
 use pcadlang::lang::{self, builtins::scene::ImageValue};
 use pcadlang::report::html::{MeshData, Page, page};
 use pcadlang::report::{
@@ -46,7 +46,7 @@ pub struct Outcome {
     pub kernels: Vec<KernelStats>,
     /// What single-site kernels did, by address, over all chains.
     pub sites: Vec<SiteStats>,
-    /// The places that chains stay at, where there are several.
+    /// The modes that chains are in, where there are several.
     pub modes: Vec<Mode>,
     /// What has not converged, and the like.
     pub warnings: Vec<String>,
@@ -297,7 +297,9 @@ fn fill(
     let joints = Joints::new(s.chains(), ready.size());
     let progress = Arc::new(Progress::default());
     let best = Arc::new(BestSoFar::new(s.chains(), &progress));
-    let watches: Vec<Arc<dyn Watch>> = vec![Arc::new(joints.clone()), best.clone()];
+    // A single chain has one mode.
+    let evidence = Arc::new(Evidence::new(if s.chains() > 1 { s.chains() } else { 0 }));
+    let watches: Vec<Arc<dyn Watch>> = vec![Arc::new(joints.clone()), best.clone(), evidence.clone()];
     let options = options(job, ready, Some(Arc::new(Watches(watches))));
     let memories: Vec<Memory> = (0..s.chains()).map(|_| Memory::bounded(ROOM / s.chains() as usize)).collect();
     let sinks = sinks(dir, job, model, &memories, record, manner.resume)?;
@@ -317,12 +319,12 @@ fn fill(
     let quantities = quantities(&draws);
     let every = draws.iter().map(|d| d.every).max().unwrap_or(1);
     let kernels = table::merged(chains.iter().map(|c| &c.kernels[..]));
-    let mut warnings = table::warnings(&quantities, &kernels, chains.len());
+    let modes = modes(&quantities, Some(&evidence));
+    let mut warnings = table::warnings(&quantities, &modes, &kernels, chains.len());
     let person = job.given.who.person.unwrap_or(1);
     if *chooses {
         warnings.extend(image.iter().flat_map(|(name, image)| people::warnings(name, image, person)));
     }
-    let modes = modes(&quantities);
     let approximate = approximate(job, &chains);
     let sites = SiteStats::total(chains.iter().flat_map(|c| &c.sites));
     let places = best_of_each(&modes, &best);
@@ -336,7 +338,7 @@ fn fill(
     });
     write(dir, "summary.json", &serde_json::to_vec_pretty(&summary).unwrap_or_default())?;
     let elapsed = begun.elapsed().as_secs_f64();
-    if let Some(found) = drawn.view.as_ref().and_then(|v| joints.report(v, elapsed)) {
+    if let Some(found) = drawn.view.as_ref().and_then(|v| joints.report(v, &modes, elapsed)) {
         write(dir, "keypoints.json", &serde_json::to_vec_pretty(&found).unwrap_or_default())?;
     }
     let html = page(&Page {
@@ -344,6 +346,7 @@ fn fill(
         settings: settings(job, model, elapsed),
         pictures: drawn.pictures,
         quantities: &quantities,
+        modes: &modes,
         kernels: &kernels,
         warnings: &warnings,
         mesh: drawn.mesh.as_ref().map(|m| MeshData { positions: &drawn.positions, triangles: &m.topology.triangles }),

@@ -5,7 +5,7 @@ use pcadlang::infer::{StateError, Watch};
 use pcadlang::lang::builtins::scene::ViewValue;
 use pcadlang::lang::code::Operand;
 use pcadlang::lang::value::Located;
-use pcadlang::report::Moments;
+use pcadlang::report::{Mode, Moments};
 use pcadlang::trace::{Draws, Trace};
 use serde::{Deserialize, Serialize};
 use serde_json::{Map, Value, json};
@@ -57,8 +57,13 @@ impl Joints {
     }
 
     fn all(&self) -> Seen {
+        self.of(0..self.chains.len())
+    }
+
+    /// The draws of some chains, by their numbers from 0.
+    fn of(&self, chains: impl Iterator<Item = usize>) -> Seen {
         let mut all = Seen::default();
-        for chain in self.chains.iter() {
+        for chain in chains.filter_map(|c| self.chains.get(c)) {
             let Seen { joints, own, scene } = &chain.lock().unwrap_or_else(PoisonError::into_inner).seen;
             all.joints.merge(joints);
             all.own.merge(own);
@@ -67,15 +72,25 @@ impl Joints {
         all
     }
 
+    /// The draws of all chains, each mode by its probability if that is known.
+    fn by_probability(&self, modes: &[Mode]) -> Seen {
+        let each = modes.iter().map(|m| Some((m.probability?, self.of(m.chains.iter().map(|c| c.wrapping_sub(1))))));
+        let Some(each) = each.collect::<Option<Vec<_>>>().filter(|e| !e.is_empty()) else { return self.all() };
+        let mixed = |part: fn(&Seen) -> &Moments| {
+            Moments::mixture(&each.iter().map(|(p, s)| (*p, part(s).clone())).collect::<Vec<_>>())
+        };
+        Seen { joints: mixed(|s| &s.joints), own: mixed(|s| &s.own), scene: mixed(|s| &s.scene) }
+    }
+
     /// The landmarks of a view; none before the camera.
     pub fn positions(&self, view: &ViewValue) -> Vec<(Arc<str>, Option<[f64; 2]>)> {
         let (width, height) = self.pixels(view);
         view.landmarks(width, height).map(|(name, at)| (Arc::clone(name), at)).collect()
     }
 
-    /// The file: means and spreads over all draws of all chains, and the best state, that of `view`. None if it has no
-    /// landmarks.
-    pub fn report(&self, view: &ViewValue, seconds: f64) -> Option<Value> {
+    /// The file: means and spreads over all draws of all chains, each of the modes they are in by its probability, and the best
+    /// state, that of `view`. None if it has no landmarks.
+    pub fn report(&self, view: &ViewValue, modes: &[Mode], seconds: f64) -> Option<Value> {
         let best = self.positions(view);
         if best.is_empty() {
             return None;
@@ -86,7 +101,7 @@ impl Joints {
                 m.iter().map(|(name, p)| (name.to_owned(), numbers(&mut p.mean.iter().copied().chain([p.sd()]))));
             each.collect()
         };
-        let Seen { joints, own, scene } = self.all();
+        let Seen { joints, own, scene } = self.by_probability(modes);
         let best: Map<String, Value> =
             best.iter().filter_map(|(name, at)| Some((name.to_string(), numbers(&mut (*at)?.into_iter())))).collect();
         Some(json!({

@@ -1,4 +1,4 @@
-//! A picture of each place that chains stay at, where they do not agree: the best state of its chains over the photograph.
+//! A picture of each mode that chains are in, where they do not agree: the best state of its chains over the photograph.
 
 use super::best::Shown;
 use super::job::write;
@@ -12,13 +12,13 @@ use pcadlang::session::over;
 use pcadlang::vision::Photo;
 use std::sync::Arc;
 
-/// How many places are shown, as many as the table has.
+/// How many modes are shown, as many as the table has.
 const SHOWN: usize = 5;
 /// Pictures in a row, and the longer side of each, pixels.
 const COLUMNS: u32 = 3;
 const SIDE: u32 = 384;
 
-/// Each place's best state, with what is said below its picture.
+/// Each mode's best state, with what is said below its picture.
 pub fn best_of_each(modes: &[Mode], best: &BestSoFar) -> Vec<(String, Arc<BestState>)> {
     let chains: usize = modes.iter().map(|m| m.chains.len()).sum();
     let state = |m: &Mode| {
@@ -27,13 +27,14 @@ pub fn best_of_each(modes: &[Mode], best: &BestSoFar) -> Vec<(String, Arc<BestSt
     };
     let said = |(i, m): (usize, &Mode)| {
         let best = state(m)?;
-        let text = format!("{}: {} of {chains}, {:.0}", i + 1, m.chains.len(), best.log_joint);
+        let probability = m.probability.map_or(String::new(), |p| format!(", {:.0} %", 100.0 * p));
+        let text = format!("{}: {} of {chains}{probability}, {:.0}", i + 1, m.chains.len(), best.log_joint);
         Some((text, best))
     };
     modes.iter().take(SHOWN).enumerate().filter_map(said).collect()
 }
 
-/// Writes `modes.png` and shows it on the page, if there are several places and something is seen.
+/// Writes `modes.png` and shows it on the page, if there are several modes and something is seen.
 pub fn show_places(
     dir: &RunDir,
     seed: u64,
@@ -62,7 +63,8 @@ pub fn show_places(
     let bytes = png(&sheet).map_err(|e| plain(e.to_string()))?;
     write(dir, "modes.png", &bytes)?;
     shown.pictures.push((
-        "the places that the chains stay at: how many chains, the log joint density of their best state",
+        "the modes that the chains are in: how many chains, the probability by their estimated evidence, the log joint density of \
+         their best state",
         bytes,
     ));
     Ok(())

@@ -87,6 +87,12 @@ pub(crate) fn attempts<T>(most: u64, mut draw: impl FnMut(u64) -> TraceResult<T>
     }
 }
 
+/// Draws from the prior and keeps nothing, for what is worked out once and kept by the data: a failure is for the chains to tell.
+pub(super) fn draw_once(code: &Arc<Code>, seed: u64, limits: Limits) {
+    let draws = Draws { key: StreamKey::new(seed, 0, Purpose::START), step: 0, lane: 0 };
+    let _ = Trace::simulate(Arc::clone(code), draws, limits);
+}
+
 /// The traces a chain starts with, the best first: as many as are to be kept, or fewer if fewer draws succeed.
 ///
 /// # Errors

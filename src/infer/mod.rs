@@ -11,6 +11,7 @@ mod default_plan;
 #[doc(hidden)]
 pub mod diagnostics;
 pub mod draws;
+mod evidence;
 mod explained;
 mod expr;
 mod force;
@@ -41,6 +42,7 @@ pub use chains::run_chains;
 #[doc(hidden)]
 pub use default_plan::default_plan;
 #[doc(hidden)]
+pub use evidence::{Evidence, Weighed};
 pub use explained::{Selecting, selecting};
 pub(crate) use force::put as force;
 pub use foreign::KernelCall;

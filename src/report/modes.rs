@@ -1,7 +1,8 @@
-//! The places that chains stay at, where they disagree: reported one by one, besides the means over all of them.
+//! The modes that chains stay in, where they disagree: reported one by one, besides the means over all of them.
 
 use super::{Quantity, number, table};
 use crate::infer::diagnostics;
+use crate::infer::{Evidence, Weighed};
 use indexmap::IndexMap;
 use serde::Serialize;
 use std::fmt::Write;
@@ -20,14 +21,21 @@ pub struct Mode {
     pub chains: Vec<usize>,
     /// How many of all chains they are. Chains fall where they start: it is no probability.
     pub share: f64,
+    /// Its probability among the modes ([`Weighed::probabilities`]); none if it cannot be told.
+    pub probability: Option<f64>,
+    /// Whether that is by estimates of the evidence, or as if the modes were equally wide.
+    pub by_evidence: bool,
+    /// The logarithm of its evidence and the standard error of that, if there is an estimate ([`diagnostics::log_evidence()`]).
+    pub log_evidence: Option<[f64; 2]>,
     /// The mean log joint density of their draws.
     pub log_joint: f64,
     /// The mean and standard deviation of each quantity over their draws.
     pub quantities: IndexMap<String, [f64; 2]>,
 }
 
-/// The modes of a run, the largest first; none where the chains agree, or cannot be told apart.
-pub fn modes(quantities: &[Quantity]) -> Vec<Mode> {
+/// The modes of a run, the most probable first, or the one of most chains where probabilities are not known; none where the chains
+/// agree, or cannot be told apart. `evidence` is what watched the run.
+pub fn modes(quantities: &[Quantity], evidence: Option<&Evidence>) -> Vec<Mode> {
     let worst = apart(quantities);
     let compared: Vec<&[Vec<f64>]> = worst.iter().take(COMPARED).map(|q| &q.chains[..]).collect();
     let groups = diagnostics::modes(&compared);
@@ -35,7 +43,16 @@ pub fn modes(quantities: &[Quantity]) -> Vec<Mode> {
         return Vec::new();
     }
     let count: usize = groups.iter().map(Vec::len).sum();
-    groups.iter().map(|members| mode(quantities, members, count)).collect()
+    let mut all: Vec<Mode> = groups.iter().map(|members| mode(quantities, members, count)).collect();
+    let weighed: Vec<Option<Weighed>> = groups.iter().map(|members| evidence.and_then(|e| e.of(members))).collect();
+    let known = |w: &Option<Weighed>| w.and_then(|w| w.evidence).map(|e| [e.value, e.error]);
+    all.iter_mut().zip(&weighed).for_each(|(m, w)| m.log_evidence = known(w));
+    if let Some(each) = weighed.into_iter().collect::<Option<Vec<Weighed>>>() {
+        let (probabilities, by_evidence) = Weighed::probabilities(&each);
+        all.iter_mut().zip(probabilities).for_each(|(m, p)| (m.probability, m.by_evidence) = (Some(p), by_evidence));
+        all.sort_by(|a, b| b.probability.unwrap_or(0.0).total_cmp(&a.probability.unwrap_or(0.0)));
+    }
+    all
 }
 
 /// The quantities that chains may disagree on, the worst first. Those that never moved have no R-hat, but may be at several
@@ -57,6 +74,9 @@ fn mode(quantities: &[Quantity], members: &[usize], count: usize) -> Mode {
     Mode {
         chains: members.iter().map(|c| c + 1).collect(),
         share: members.len() as f64 / count as f64,
+        probability: None,
+        by_evidence: false,
+        log_evidence: None,
         log_joint: all.first().map_or(f64::NAN, |(_, m)| m[0]),
         quantities: all,
     }
@@ -68,9 +88,9 @@ pub fn modes_table(modes: &[Mode], quantities: &[Quantity]) -> String {
     if rows.is_empty() {
         return String::new();
     }
-    let mut s = format!("the chains stay at {} different places:\n{}", modes.len(), table::aligned(&rows));
+    let mut s = format!("the chains are in {} different modes:\n{}", modes.len(), table::aligned(&rows));
     if let Some(more) = modes.len().checked_sub(SHOWN.0 + 1) {
-        let _ = writeln!(s, "… and {} more places, in summary.json", more + 1);
+        let _ = writeln!(s, "… and {} more modes, in summary.json", more + 1);
     }
     s
 }
@@ -85,9 +105,12 @@ pub(super) fn modes_rows(modes: &[Mode], quantities: &[Quantity]) -> Vec<Vec<Str
         [name.to_owned(), all].into_iter().chain(shown.iter().map(each)).collect::<Vec<String>>()
     };
     let mut head = vec!["mean of".to_owned(), "all chains".to_owned()];
-    head.extend((1..=shown.len()).map(|i| format!("place {i}")));
+    head.extend((1..=shown.len()).map(|i| format!("mode {i}")));
     let count: usize = modes.iter().map(|m| m.chains.len()).sum();
     let mut rows = vec![head, row("chains", count.to_string(), &|m| m.chains.len().to_string())];
+    if shown.iter().all(|m| m.probability.is_some()) {
+        rows.push(row("probability", String::new(), &|m| number(m.probability.unwrap_or(f64::NAN))));
+    }
     let mean = |q: &Quantity, m: &Mode| m.quantities.get(&q.name).map_or(f64::NAN, |x| x[0]);
     let differs = |q: &Quantity| modes.iter().any(|m| mean(q, m).to_bits() != mean(q, &modes[0]).to_bits());
     let mut differ = apart(quantities);
@@ -108,16 +131,21 @@ pub(super) fn warning(modes: &[Mode]) -> Option<String> {
         return None;
     }
     let what = match each {
-        true => format!("each of the {chains} chains stays at a place of its own"),
-        false => format!("the {chains} chains stay at {n} different places"),
+        true => format!("each of the {chains} chains is in a mode of its own"),
+        false => format!("the {chains} chains are in {n} different modes"),
+    };
+    let probable = match (modes[0].probability.map(number), modes[0].by_evidence) {
+        (Some(p), true) => format!("by its estimated evidence the first has a probability of {p}"),
+        (Some(p), false) => format!("the first has a probability of {p} by its density, if the modes are equally wide"),
+        (None, _) => "how many chains are in a mode is not its probability".into(),
     };
     Some(format!(
-        "{what}, so means over all of them say little: look at each place; a longer warmup, `temper` or `knn` may join them (how \
-         many chains are at a place is not its probability)"
+        "{what}, so means over all of them say little: look at each mode; a longer warmup, `temper` or `knn` may join them \
+         ({probable})"
     ))
 }
 
-/// An R-hat for people: chains at different places have one as large as they are apart.
+/// An R-hat for people: chains in different modes have one as large as they are apart.
 pub fn r_hat_text(r: f64) -> String {
     match r {
         r if r.is_nan() => "-".into(),
@@ -148,24 +176,24 @@ mod tests {
             quantity("x", [0.0, 30.0, 0.0, 0.0]),
             quantity("y", [7.0; 4]),
         ];
-        let found = modes(&all);
+        let found = modes(&all, None);
         assert_eq!(found.iter().map(|m| m.chains.clone()).collect::<Vec<_>>(), [vec![1, 3, 4], vec![2]]);
         assert_eq!((found[0].share, found[1].share), (0.75, 0.25));
         assert!((found[1].quantities["x"][0] - 30.5).abs() < 0.1 && (found[1].log_joint + 8.5).abs() < 0.1);
         let text = modes_table(&found, &all);
         let lines: Vec<Vec<&str>> = text.lines().map(|l| l.split_whitespace().collect()).collect();
-        assert_eq!(lines[0].join(" "), "the chains stay at 2 different places:");
+        assert_eq!(lines[0].join(" "), "the chains are in 2 different modes:");
         assert_eq!(lines[2], ["chains", "4", "3", "1"]);
         assert!(lines.iter().any(|l| l[0] == "x") && !lines.iter().any(|l| l[0] == "y"), "{text}");
         assert!(text.lines().all(|l| l.chars().count() <= table::COLUMNS));
-        assert!(warning(&found).is_some_and(|w| w.starts_with("the 4 chains stay at 2 different places")));
+        assert!(warning(&found).is_some_and(|w| w.starts_with("the 4 chains are in 2 different modes")));
         assert!(serde_json::to_string(&found).is_ok_and(|j| j.contains("\"chains\":[1,3,4]")));
     }
 
     #[test]
     fn chains_that_agree_have_none() {
         let all = [quantity("log_joint", [0.0; 4]), quantity("x", [3.0; 4])];
-        assert!(modes(&all).is_empty() && modes_table(&[], &all).is_empty() && warning(&[]).is_none());
+        assert!(modes(&all, None).is_empty() && modes_table(&[], &all).is_empty() && warning(&[]).is_none());
     }
 
     #[test]

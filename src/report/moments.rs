@@ -66,6 +66,32 @@ impl Moments {
         }
     }
 
+    /// A mixture of others by their shares, which sum to 1; a point that some lack is a mixture of the rest. Counts are summed.
+    pub fn mixture(all: &[(f64, Moments)]) -> Moments {
+        let mut mixed = Moments::default();
+        for (_, moments) in all {
+            mixed.merge(moments);
+        }
+        for (name, p) in &mut mixed.0 {
+            let own: Vec<(f64, &Point)> = all.iter().filter_map(|(share, m)| Some((*share, m.0.get(name)?))).collect();
+            let sum: f64 = own.iter().map(|(share, _)| share).sum();
+            if !(sum > 0.0) {
+                continue;
+            }
+            let freedom = p.count.saturating_sub(1).max(1) as f64;
+            for axis in 0..p.mean.len() {
+                let mean = own.iter().map(|(share, q)| share / sum * q.mean[axis]).sum::<f64>();
+                let variance = |q: &Point| {
+                    let off = q.mean[axis] - mean;
+                    q.squares[axis] / q.count.saturating_sub(1).max(1) as f64 + off * off
+                };
+                p.squares[axis] = freedom * own.iter().map(|(share, q)| share / sum * variance(q)).sum::<f64>();
+                p.mean[axis] = mean;
+            }
+        }
+        mixed
+    }
+
     /// The points.
     pub fn iter(&self) -> impl Iterator<Item = (&str, &Point)> {
         self.0.iter().map(|(name, p)| (&**name, p))
@@ -75,6 +101,22 @@ impl Moments {
 #[cfg(test)]
 mod tests {
     use super::*;
+
+    #[test]
+    fn a_mixture_has_its_shares_means_and_spreads() {
+        let name: Arc<str> = Arc::from("a");
+        let of = |centre: f64, n: u32| {
+            let mut m = Moments::default();
+            (0..n).for_each(|i| m.add(&name, &[centre + f64::from(i % 2)], 0.0));
+            m
+        };
+        let mixed = Moments::mixture(&[(0.75, of(0.0, 10_000)), (0.25, of(8.0, 100)), (0.0, of(99.0, 70))]);
+        let (_, p) = mixed.iter().next().unwrap();
+        assert!((p.mean[0] - (0.5 + 0.25 * 8.0)).abs() < 1e-12, "{p:?}");
+        // Within: 1/4. Between: 3/16 of 8 squared.
+        assert!((p.sd() * p.sd() - (0.25 + 0.1875 * 64.0)).abs() < 0.001, "{}", p.sd());
+        assert_eq!(p.count, 10_170);
+    }
 
     #[test]
     fn merged_chains_are_as_one_and_as_two_passes() {

@@ -4,7 +4,7 @@
 //! draws a chain.
 
 use super::Quantity;
-use super::modes::{self, DISAGREE};
+use super::modes::{self, DISAGREE, Mode};
 use crate::infer::draws::KernelStats;
 
 /// Proposals before a kernel is judged.
@@ -13,7 +13,7 @@ const JUDGED: u64 = 200;
 const STUCK: usize = 50;
 
 /// Sentences for the user, the gravest first; none if all is well. `chains` is the number of chains that were run.
-pub fn warnings(quantities: &[Quantity], kernels: &[KernelStats], chains: usize) -> Vec<String> {
+pub fn warnings(quantities: &[Quantity], modes: &[Mode], kernels: &[KernelStats], chains: usize) -> Vec<String> {
     let mut out = Vec::new();
     if let Some(q) = quantities.iter().find(|q| is_stuck(q)) {
         out.push(format!(
@@ -27,7 +27,7 @@ pub fn warnings(quantities: &[Quantity], kernels: &[KernelStats], chains: usize)
         let r = if r > 100.0 { "above 100".to_owned() } else { format!("{r:.2}") };
         out.push(format!("{what}: R-hat of {name} is {r} (1.01 or less is wanted); run longer with --time or --steps"));
     }
-    out.extend(modes::warning(&modes::modes(quantities)));
+    out.extend(modes::warning(modes));
     let wanted = 100 * chains;
     if let Some((e, name)) = worst(quantities, |q| -q.summary.ess_bulk).filter(|(e, _)| -e < wanted as f64) {
         let e = -e;
@@ -78,6 +78,7 @@ fn too_short(q: &Quantity) -> bool {
 
 #[cfg(test)]
 mod tests {
+    use super::super::modes;
     use super::*;
     use crate::infer::diagnostics::summary;
 
@@ -98,34 +99,37 @@ mod tests {
     fn a_good_run_has_none() {
         let q = quantity("x", (0..4).map(|c| noise(c * 977 + 13, 2000)).collect());
         assert!(q.summary.r_hat < 1.01 && q.summary.ess_bulk > 400.0, "{:?}", q.summary);
-        assert_eq!(warnings(&[q], &[kernel(1000, 300, 10), kernel(0, 0, 0)], 4), [""; 0]);
+        assert_eq!(warnings(&[q], &[], &[kernel(1000, 300, 10), kernel(0, 0, 0)], 4), [""; 0]);
     }
 
     #[test]
     fn disagreement_is_said_with_the_worst_quantity() {
         let apart = |by: f64| (0..2).map(|c| noise(c + 13, 500).iter().map(|x| x + by * c as f64).collect()).collect();
-        let w = warnings(&[quantity("near", apart(0.2)), quantity("far", apart(5.0))], &[], 2);
+        let w = {
+            let all = [quantity("near", apart(0.2)), quantity("far", apart(5.0))];
+            warnings(&all, &modes(&all, None), &[], 2)
+        };
         assert!(w[0].starts_with("the chains disagree: R-hat of far is"), "{w:?}");
-        assert!(w[1].starts_with("each of the 2 chains stays at a place of its own"), "{w:?}");
+        assert!(w[1].starts_with("each of the 2 chains is in a mode of its own"), "{w:?}");
         assert!(w[2].starts_with("few independent draws: ") && w[2].contains("of far (200 are wanted)"), "{w:?}");
     }
 
     #[test]
     fn stuck_chains_are_told_from_constants() {
         let constant = quantity("c", vec![vec![1.0; 100]; 2]);
-        assert_eq!(warnings(&[constant], &[], 0), [""; 0]);
+        assert_eq!(warnings(&[constant], &[], &[], 0), [""; 0]);
         let stuck = quantity("s", vec![vec![1.0; 100], vec![2.0; 100]]);
-        assert!(warnings(&[stuck], &[], 0)[0].contains("s never moved"));
+        assert!(warnings(&[stuck], &[], &[], 0)[0].contains("s never moved"));
     }
 
     #[test]
     fn kernels_that_do_nothing_and_short_runs() {
-        assert!(warnings(&[], &[kernel(500, 0, 0)], 2)[0].contains("none of 500"));
-        assert!(warnings(&[], &[kernel(500, 0, 400)], 2)[0].contains("400 of 500"));
-        assert_eq!(warnings(&[], &[kernel(100, 0, 100)], 2), [""; 0], "too few to judge");
-        assert!(warnings(&[quantity("x", vec![vec![1.0, 2.0]])], &[], 1)[0].starts_with("too few draws"));
+        assert!(warnings(&[], &[], &[kernel(500, 0, 0)], 2)[0].contains("none of 500"));
+        assert!(warnings(&[], &[], &[kernel(500, 0, 400)], 2)[0].contains("400 of 500"));
+        assert_eq!(warnings(&[], &[], &[kernel(100, 0, 100)], 2), [""; 0], "too few to judge");
+        assert!(warnings(&[quantity("x", vec![vec![1.0, 2.0]])], &[], &[], 1)[0].starts_with("too few draws"));
         assert_eq!(
-            warnings(&[quantity("x", vec![vec![]])], &[], 1),
+            warnings(&[quantity("x", vec![vec![]])], &[], &[], 1),
             [""; 0],
             "a run without draws has nothing to judge"
         );

@@ -111,7 +111,7 @@ fn outcomes_are_stated() {
         let got = quantile(x, p);
         points.check(same(got, expected), || format!("quantile {p} of {x:?}: {got:e}"));
     }
-    // Two places that chains stay at, however far apart or near.
+    // Two modes that chains stay in, however far apart or near.
     for (here, there) in [(1e-300, 2e-300), (-1e300, 1e300), (0.0, 1.0), (-f64::MAX, f64::MAX)] {
         let at = |c: f64| {
             chains()
@@ -124,7 +124,7 @@ fn outcomes_are_stated() {
         let r = r_hat(&x);
         points.check(r > 1.5, || format!("R-hat of {here:e} and {there:e}: {r}"));
         let groups = modes(&[&x]);
-        points.check(groups.len() == 2, || format!("places of {here:e} and {there:e}: {groups:?}"));
+        points.check(groups.len() == 2, || format!("modes of {here:e} and {there:e}: {groups:?}"));
     }
     points.finish();
 }

@@ -13,6 +13,7 @@
 mod autocovariance;
 mod chains;
 mod ess;
+mod evidence;
 mod mcse;
 mod modes;
 mod normal_scores;
@@ -21,6 +22,7 @@ mod rhat;
 mod summary;
 
 pub use ess::{ess_bulk, ess_mean, ess_quantile, ess_tail};
+pub use evidence::{Clouds, LogEvidence, log_density, log_evidence, shares};
 pub use mcse::{mcse_mean, mcse_sd};
 pub use modes::modes;
 pub use quantile::{quantile, quantile_sorted};

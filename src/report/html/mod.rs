@@ -5,7 +5,7 @@
 mod encode;
 mod plots;
 
-use super::{Quantity, number, r_hat_text, seconds};
+use super::{Mode, Quantity, number, r_hat_text, seconds};
 use crate::infer::draws::KernelStats;
 pub use encode::base64;
 use encode::{coordinates, escaped};
@@ -22,6 +22,8 @@ pub struct Page<'a> {
     pub pictures: Vec<(&'a str, Vec<u8>)>,
     /// The scalar quantities.
     pub quantities: &'a [Quantity],
+    /// The modes that the chains are in, if there are several.
+    pub modes: &'a [Mode],
     /// The kernels.
     pub kernels: &'a [KernelStats],
     /// What a reader should know first.
@@ -61,7 +63,7 @@ pub fn page(p: &Page) -> String {
     }
     pictures(&mut s, p);
     quantities(&mut s, p.quantities);
-    modes(&mut s, p.quantities);
+    modes(&mut s, p.modes, p.quantities);
     kernels(&mut s, p.kernels);
     draws(&mut s, p.quantities);
     s.push_str("<h2>Settings</h2>\n<table class=\"settings\">\n");
@@ -118,12 +120,11 @@ fn quantities(s: &mut String, quantities: &[Quantity]) {
     s.push_str("</table>\n");
 }
 
-/// Where the chains stay, if that is not one place.
-fn modes(s: &mut String, quantities: &[Quantity]) {
-    let found = super::modes(quantities);
-    let rows = super::modes::modes_rows(&found, quantities);
+/// The modes that the chains are in, if there are several.
+fn modes(s: &mut String, found: &[Mode], quantities: &[Quantity]) {
+    let rows = super::modes::modes_rows(found, quantities);
     let Some((head, body)) = rows.split_first() else { return };
-    let _ = writeln!(s, "<h2>Places</h2>\n<p class=\"note\">The chains stay at {} different places.</p>", found.len());
+    let _ = writeln!(s, "<h2>Modes</h2>\n<p class=\"note\">The chains are in {} different modes.</p>", found.len());
     s.push_str("<table>\n<tr>");
     head.iter().for_each(|h| {
         let _ = write!(s, "<th>{}", escaped(h));
@@ -185,6 +186,7 @@ mod tests {
             pictures: vec![(text, vec![1, 2, 3])],
             mesh: Some(MeshData { positions: &[[0.0, f32::NAN, 2.0]; 3], triangles: &[[0, 1, 2], [0, 1, 3]] }),
             settings: vec![("seed", text.into())],
+            modes: &super::super::modes(std::slice::from_ref(&q), None),
             quantities: &[q],
             kernels: &[kernel],
             warnings: &[text.into()],
