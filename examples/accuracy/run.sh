@@ -21,7 +21,7 @@ mkdir -p "$3" && cd "$3"
 # Variants with other kernels. A bank belongs to the text of its program, so each size has a program.
 sed -e 's|= edges as picture;|= edges with coarse = scene.contour(view, size = 40) as picture;|' \
     -e 's|= photo as colour;|= photo with coarse = flat() as colour;|' \
-    -e 's|=> drift(\$affine + @H + @r0);|=> delayed(drift($affine + @H + @r0), at = @picture + @colour);|' \
+    -e 's|=> drift(\$affine + @H + @r0 + \$camera);|=> delayed(drift($affine + @H + @r0 + $camera), at = @picture + @colour);|' \
     -e 's|=> drift(\$profile);|=> delayed(drift($profile), at = @picture + @colour);|' \
     "$root/programs/lathe.pcad" > lathe_delayed.pcad
 camera=$(find "$objects" -name camera.json | sort | head -n 1)
