@@ -350,6 +350,11 @@ fn the_lathe_draws_the_same_on_any_number_of_threads() {
     assert_eq!(one, run("two", &["--threads", "2"]));
     assert_eq!(one, run("full", &["--threads", "2", "--no-incremental"]));
     assert!(f.exists("one/best.obj") && f.exists("one/overlay.png") && f.exists("one/depth.npy"));
+    // A camera that is not known is a choice more, and moves.
+    run("lens", &["--set", "known=false", "--set", "steep=60"]);
+    let summary: serde_json::Value = serde_json::from_str(&f.read("lens/summary.json")).unwrap();
+    let choices = summary["choices"].as_array().unwrap();
+    assert!(choices.iter().any(|c| c["address"].as_str().is_some_and(|a| a.contains("longer"))), "{choices:?}");
 }
 
 /// A wide cup seen from above in perspective: where the starts of the shipped program have its tilt, they have its height and
