@@ -63,8 +63,7 @@ pub fn show_places(
     let bytes = png(&sheet).map_err(|e| plain(e.to_string()))?;
     write(dir, "modes.png", &bytes)?;
     shown.pictures.push((
-        "the modes that the chains are in: how many chains, the probability by their estimated evidence, the log joint density of \
-         their best state",
+        "the modes that the chains are in: how many chains, how probable they are, the log joint density of their best state",
         bytes,
     ));
     Ok(())

@@ -75,7 +75,7 @@ impl Moments {
         for (name, p) in &mut mixed.0 {
             let own: Vec<(f64, &Point)> = all.iter().filter_map(|(share, m)| Some((*share, m.0.get(name)?))).collect();
             let sum: f64 = own.iter().map(|(share, _)| share).sum();
-            if !(sum > 0.0) {
+            if sum <= 0.0 || sum.is_nan() {
                 continue;
             }
             let freedom = p.count.saturating_sub(1).max(1) as f64;

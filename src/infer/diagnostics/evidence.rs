@@ -123,7 +123,9 @@ impl Clouds {
             }
             self.blocks.push(Cloud::default());
         }
-        self.blocks.iter_mut().next_back().into_iter().for_each(|b| b.add(y, log_density));
+        if let Some(block) = self.blocks.last_mut() {
+            block.add(y, log_density);
+        }
     }
 
     /// The number of draws.
