@@ -77,7 +77,7 @@ impl Joints {
         let each = modes.iter().map(|m| Some((m.probability?, self.of(m.chains.iter().map(|c| c.wrapping_sub(1))))));
         let Some(each) = each.collect::<Option<Vec<_>>>().filter(|e| !e.is_empty()) else { return self.all() };
         let mixed = |part: fn(&Seen) -> &Moments| {
-            Moments::mixture(&each.iter().map(|(p, s)| (*p, part(s).clone())).collect::<Vec<_>>())
+            Moments::mixture(&each.iter().map(|(p, s)| (*p, part(s))).collect::<Vec<_>>())
         };
         Seen { joints: mixed(|s| &s.joints), own: mixed(|s| &s.own), scene: mixed(|s| &s.scene) }
     }

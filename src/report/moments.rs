@@ -22,7 +22,12 @@ impl Point {
     /// The square root of the mean of the variances along the axes; 0 of a single draw.
     pub fn sd(&self) -> f64 {
         let mean = self.squares.iter().sum::<f64>() / self.squares.len().max(1) as f64;
-        (mean / self.count.saturating_sub(1).max(1) as f64).sqrt()
+        (mean / self.freedom()).sqrt()
+    }
+
+    /// What sums of squares are divided by.
+    fn freedom(&self) -> f64 {
+        self.count.saturating_sub(1).max(1) as f64
     }
 
     fn merge(&mut self, o: &Point) {
@@ -67,7 +72,7 @@ impl Moments {
     }
 
     /// A mixture of others by their shares, which sum to 1; a point that some lack is a mixture of the rest. Counts are summed.
-    pub fn mixture(all: &[(f64, Moments)]) -> Moments {
+    pub fn mixture(all: &[(f64, &Moments)]) -> Moments {
         let mut mixed = Moments::default();
         for (_, moments) in all {
             mixed.merge(moments);
@@ -78,12 +83,12 @@ impl Moments {
             if sum <= 0.0 || sum.is_nan() {
                 continue;
             }
-            let freedom = p.count.saturating_sub(1).max(1) as f64;
+            let freedom = p.freedom();
             for axis in 0..p.mean.len() {
                 let mean = own.iter().map(|(share, q)| share / sum * q.mean[axis]).sum::<f64>();
                 let variance = |q: &Point| {
                     let off = q.mean[axis] - mean;
-                    q.squares[axis] / q.count.saturating_sub(1).max(1) as f64 + off * off
+                    q.squares[axis] / q.freedom() + off * off
                 };
                 p.squares[axis] = freedom * own.iter().map(|(share, q)| share / sum * variance(q)).sum::<f64>();
                 p.mean[axis] = mean;
@@ -110,7 +115,7 @@ mod tests {
             (0..n).for_each(|i| m.add(&name, &[centre + f64::from(i % 2)], 0.0));
             m
         };
-        let mixed = Moments::mixture(&[(0.75, of(0.0, 10_000)), (0.25, of(8.0, 100)), (0.0, of(99.0, 70))]);
+        let mixed = Moments::mixture(&[(0.75, &of(0.0, 10_000)), (0.25, &of(8.0, 100)), (0.0, &of(99.0, 70))]);
         let (_, p) = mixed.iter().next().unwrap();
         assert!((p.mean[0] - (0.5 + 0.25 * 8.0)).abs() < 1e-12, "{p:?}");
         // Within: 1/4. Between: 3/16 of 8 squared.
