@@ -18,7 +18,7 @@ pub use program::Program;
 
 use crate::diag::{Diagnostic, IntoDiagnostic, Severity, SourceMap};
 use crate::infer::draws::Sink;
-use crate::infer::{ChainError, ChainResult, Progress, RunOptions, default_plan, run_chains};
+use crate::infer::{ChainError, ChainResult, Progress, RunOptions, attempts, default_plan, run_chains};
 use crate::lang::code::Code;
 use crate::lang::error::RunError;
 use crate::lang::lower::{Compiled, Export, Report};
@@ -33,6 +33,8 @@ use std::sync::Arc;
 
 /// How many draws from the prior show what choices a default plan is for.
 const DRAWS_FOR_PLAN: u64 = 10;
+/// How many are tried until one has a value.
+const ATTEMPTS_FOR_PLAN: u64 = 1000;
 
 /// A compiled program with its data.
 #[derive(Debug)]
@@ -127,9 +129,10 @@ impl Model {
             ChainError::Start(StartError::Impossible(zero)) => {
                 let mut d = plain(format!("no chain can start: {zero}"));
                 for (i, term) in zero.terms.iter().take(5).enumerate() {
+                    let why = term.outside.as_ref().map(|why| format!(": {why}")).unwrap_or_default();
                     d = match i {
-                        0 => d.primary(term.span, format!("the log density of {} is -inf", term.address)),
-                        _ => d.secondary(term.span, format!("so is that of {}", term.address)),
+                        0 => d.primary(term.span, format!("the log density of {} is -inf{why}", term.address)),
+                        _ => d.secondary(term.span, format!("so is that of {}{why}", term.address)),
                     };
                 }
                 if zero.terms.len() > 5 {
@@ -139,7 +142,10 @@ impl Model {
                     let drawn: Vec<String> = zero.drawn.iter().map(|(a, v)| format!("{a} = {v}")).collect();
                     d = d.note(format!("in the last of them {}", drawn.join(", ")));
                 }
-                d.hint("widen the prior or the spread of what is observed; a factor of -inf rules a state out")
+                d.hint(match zero.terms.first().is_some_and(|t| t.outside.is_some()) {
+                    true => "check the data, or observe them under a distribution that can give them",
+                    false => "widen the prior or the spread of what is observed; a factor of -inf rules a state out",
+                })
             }
             ChainError::Sink(e) => plain(format!("draws cannot be written: {e}")),
             ChainError::Checkpoint(e) => plain(format!("a chain cannot go on: {e}")),
@@ -157,8 +163,15 @@ impl Model {
         if let Some(p) = self.compiled.plans.first() {
             return Ok((Arc::clone(&p.body), None));
         }
-        let mut draws = vec![self.simulate(0, 0)?];
-        draws.extend((1..DRAWS_FOR_PLAN).filter_map(|i| self.simulate(0, i).ok()));
+        let drawn = |i| {
+            let draws = Draws { key: StreamKey::new(0, 0, Purpose::START), step: i, lane: 0 };
+            Trace::simulate(Arc::clone(self.code()), draws, self.limits.clone())
+        };
+        let mut draws: Vec<Trace> = (0..DRAWS_FOR_PLAN).filter_map(|i| drawn(i).ok()).collect();
+        if draws.is_empty() {
+            // Draws may lead where the program has no value, such as a negative spread: the plan is of those that do not.
+            draws.push(attempts(ATTEMPTS_FOR_PLAN, drawn).map_err(|e| self.run_error(*e))?);
+        }
         let text = default_plan(&mut draws);
         let mut sources = self.sources.clone();
         let file = sources.add("<default plan>", &text);

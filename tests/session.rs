@@ -45,6 +45,32 @@ fn state(s: &Session) -> (String, Vec<String>, u64) {
 }
 
 #[test]
+fn what_people_type_is_understood() {
+    let mut s = line();
+    assert_eq!(says(&mut s, ":why slope"), says(&mut s, ":why @slope"));
+    says(&mut s, ":set slope 1.5");
+    assert_eq!(says(&mut s, "slope").trim(), "1.5");
+    assert!(says(&mut s, ":flip intercept").contains("@intercept: "));
+    // Each address of the listing is one to ask for.
+    says(&mut s, "for k in [\"a\", \"b\"] { t[k] ~ normal(0, 1); observe normal(t[k], 1) = 2; }");
+    for (address, ..) in s.trace().choices() {
+        assert!(says(&mut s, &format!(":why {address}")).starts_with(&format!("{address} = ")));
+        says(&mut s, &format!(":set {address} {}", if address.to_string() == "@wide" { "true" } else { "0.5" }));
+    }
+    let help = says(&mut s, ":help");
+    for word in ["help", "?", ":?", ":h"] {
+        assert_eq!(says(&mut s, word), help, "{word}");
+    }
+    for word in ["exit", "quit", "q", ":q", ":exit"] {
+        assert!(s.enter(word).is_ok_and(|r| r.ends), "{word}");
+    }
+    assert!(s.enter("clear").is_ok_and(|r| r.clears));
+    // A name of the program is that first.
+    says(&mut s, "let q = 7");
+    assert_eq!(says(&mut s, "q").trim(), "7");
+}
+
+#[test]
 fn an_error_leaves_everything_as_it_was() {
     let mut s = line();
     let before = state(&s);
@@ -66,7 +92,7 @@ fn an_error_leaves_everything_as_it_was() {
         (":set @slope 1e400", "large"),
         (":set @slope inf", "finite"),
         (":set @wide 3", "does not fit"),
-        (":set size 3", "no param"),
+        (":set size 3", "@size"),
         (":why $line", "2 choices"),
         (":infer mh(one(@nothing))", "nothing"),
         (":infer { repeat 10 { jump(@slope); } }", "jump"),

@@ -1,6 +1,7 @@
 //! The command line.
 
 use super::detect::Detect;
+use super::files::program_name;
 use super::people::Who;
 use clap::builder::{PossibleValuesParser, TypedValueParser};
 use clap::{Args, Parser, Subcommand, ValueHint};
@@ -54,7 +55,7 @@ pub enum Command {
 #[derive(Args, Clone, Debug)]
 pub struct Given {
     /// The program: a file, or the name of a shipped one such as lathe.pcad
-    #[arg(value_name = "PROG", value_hint = ValueHint::FilePath)]
+    #[arg(value_name = "PROG", value_hint = ValueHint::FilePath, value_parser = program_name)]
     pub program: String,
     /// Set a `param`, its value as in a program; may be repeated
     #[arg(long = "set", value_name = "NAME=VALUE", value_parser = pair)]
@@ -122,11 +123,11 @@ pub struct Sampling {
     /// Kernel applications per chain in warm-up, in place of what the program says
     #[arg(long)]
     pub warmup: Option<u64>,
-    /// Known settings for so much accuracy, if there are any of the program: `own` runs it as it is
+    /// Measured presets of speed against accuracy, where the program has them; `own` runs the program as it is
     #[arg(long, value_parser = QualityArg::parser())]
     pub quality: Option<QualityArg>,
-    /// Time in all (of a dataset: each case), such as 10s, 2m or 500ms; at most half of it is warm-up. Settings that are known to be
-    /// best for it are used, unless there is --quality
+    /// Time in all (of a dataset: each case), such as 10s, 2m or 500ms; at most half of it is warm-up. The measured preset for
+    /// that time is used, unless there is --quality
     #[arg(long, value_parser = duration)]
     pub time: Option<Duration>,
     /// Re-run the whole program at each step: slow, and the same draws; for checking the engine
@@ -195,6 +196,9 @@ pub struct Run {
     /// Also say what was modelled, proposed, redrawn and skipped, and why
     #[arg(long)]
     pub explain: bool,
+    /// List everything that is approximate in the run
+    #[arg(long, short)]
+    pub verbose: bool,
     /// Print the summary as JSON
     #[arg(long)]
     pub json: bool,
@@ -369,7 +373,7 @@ pub enum FeatureKind {
 #[command(after_help = CHECKS)]
 pub struct Check {
     /// The programs
-    #[arg(required = true, value_name = "PROG", value_hint = ValueHint::FilePath)]
+    #[arg(required = true, value_name = "PROG", value_hint = ValueHint::FilePath, value_parser = program_name)]
     pub programs: Vec<String>,
     /// Check again whenever a file of a program changes, until interrupted
     #[arg(long, conflicts_with_all = ["sbc", "geweke"])]
@@ -488,7 +492,7 @@ pub struct Man {
 #[command(after_help = PROMPT)]
 pub struct Repl {
     /// The program to begin with: a file, or the name of a shipped one; an empty one if left out
-    #[arg(value_name = "PROG")]
+    #[arg(value_name = "PROG", value_parser = program_name)]
     pub program: Option<String>,
     /// Set a `param`, its value as in a program; may be repeated
     #[arg(long = "set", value_name = "NAME=VALUE", value_parser = pair, requires = "program")]

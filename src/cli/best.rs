@@ -137,7 +137,7 @@ fn mesh(solid: &Solid) -> Option<Mesh> {
     match solid.to_mesh() {
         Ok(mesh) => Some(mesh),
         Err(e) => {
-            eprintln!("warning: no mesh is written: {e}");
+            error_line!("warning: no mesh is written: {e}");
             None
         }
     }
@@ -189,7 +189,7 @@ fn export(
     match exported(value, &name) {
         Ok(bytes) => write(dir, &name, &bytes),
         Err(e) => {
-            eprintln!("warning: no mesh is written: {e}");
+            error_line!("warning: no mesh is written: {e}");
             Ok(())
         }
     }

@@ -30,12 +30,12 @@ pub fn calibrate(a: &Check) -> Result<(), Failure> {
         let mut passes = true;
         if a.sbc {
             let (said, took) = run(a, &model, &interrupt, REPLICATES.0, sbc)?;
-            print!("{}", ranks(path, &said, a.seed, took));
+            print_text!("{}", ranks(path, &said, a.seed, took));
             passes &= said.passes();
         }
         if a.geweke {
             let (said, took) = run(a, &model, &interrupt, REPLICATES.1, geweke)?;
-            print!("{}", turns(path, &said, a.seed, took));
+            print_text!("{}", turns(path, &said, a.seed, took));
             passes &= said.passes();
         }
         if !passes {

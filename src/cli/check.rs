@@ -12,7 +12,7 @@ pub fn check(a: &Check) -> Result<(), Failure> {
         let program = match Program::open_allowing(path, &a.allowed.allow_read) {
             Ok(p) => p,
             Err(e) => {
-                eprint!("{}", render(&e.sources, &e.diagnostics, has_colors()));
+                error_text!("{}", render(&e.sources, &e.diagnostics, has_colors()));
                 failed.push(path.as_str());
                 continue;
             }
@@ -20,18 +20,18 @@ pub fn check(a: &Check) -> Result<(), Failure> {
         let interface = program.interface();
         match program.without_data().compile() {
             Ok(_) => {
-                println!("{path}: no mistakes found");
+                print_line!("{path}: no mistakes found");
                 for p in interface.params {
                     let (default, help) = (p.default.unwrap_or_default(), p.help.unwrap_or_default());
-                    println!("{}", format!("  --set {} = {default}  {help}", p.name).trim_end());
+                    print_line!("{}", format!("  --set {} = {default}  {help}", p.name).trim_end());
                 }
                 for d in interface.data.iter().filter(|d| !d.has_default) {
                     let (ty, help) = (d.ty.as_deref().unwrap_or("any"), d.help.as_deref().unwrap_or_default());
-                    println!("{}", format!("  --observe {}=FILE ({ty})  {help}", d.name).trim_end());
+                    print_line!("{}", format!("  --observe {}=FILE ({ty})  {help}", d.name).trim_end());
                 }
             }
             Err(e) => {
-                eprint!("{}", render(&e.sources, &e.diagnostics, has_colors()));
+                error_text!("{}", render(&e.sources, &e.diagnostics, has_colors()));
                 failed.push(path.as_str());
             }
         }

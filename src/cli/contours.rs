@@ -28,6 +28,6 @@ pub fn contours(a: &Contours) -> Result<(), Failure> {
     };
     let picture = png(&map.to_image()).map_err(|e| plain(e.to_string()))?;
     files::write(&a.out, &picture)?;
-    println!("{}: {} contour points in {} x {} pixels", a.out.display(), map.len(), map.width, map.height);
+    print_line!("{}: {} contour points in {} x {} pixels", a.out.display(), map.len(), map.width, map.height);
     Ok(())
 }

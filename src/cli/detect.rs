@@ -98,9 +98,9 @@ pub fn detect(a: &Detect) -> Result<(), Failure> {
     if let Some(path) = &a.overlay {
         files::write(path, &png(&overlay(&photo, &people)).map_err(|e| plain(e.to_string()))?)?;
     }
-    println!("{}", found(&people));
+    print_line!("{}", found(&people));
     for (i, p) in people.iter().enumerate() {
-        println!("{}", line(i + 1, p, size));
+        print_line!("{}", line(i + 1, p, size));
     }
     Ok(())
 }

@@ -12,12 +12,12 @@ pub fn doc(a: &Doc) -> Result<(), Failure> {
         return find(&table, &words.join(" "));
     }
     let Some(name) = &a.name else {
-        print!("{}", docs::reference(&table));
+        print_text!("{}", docs::reference(&table));
         return Ok(());
     };
     match docs::doc(&table, name) {
         Some(text) => {
-            print!("{text}");
+            print_text!("{text}");
             Ok(())
         }
         None => {
@@ -40,18 +40,18 @@ const LISTED: usize = 20;
 fn find(table: &Table, words: &str) -> Result<(), Failure> {
     let found = search(table, words);
     for (word, near) in &found.instead {
-        println!("Nothing says \"{word}\"; \"{near}\" is looked for.\n");
+        print_line!("Nothing says \"{word}\"; \"{near}\" is looked for.\n");
     }
     for word in found.unknown.iter().filter(|_| !found.entries.is_empty()) {
-        println!("Nothing says \"{word}\".\n");
+        print_line!("Nothing says \"{word}\".\n");
     }
     for b in found.entries.iter().take(LISTED) {
-        println!("{}\n    {}", b.signature(), b.doc);
+        print_line!("{}\n    {}", b.signature(), b.doc);
     }
     match found.entries.len() {
         0 => Err(Failure::Plain(format!("no built-in has {words:?}"), Some("`pcadlang doc` lists all of them".into()))),
         n if n > LISTED => {
-            println!("… and {} more; another word narrows it down", n - LISTED);
+            print_line!("… and {} more; another word narrows it down", n - LISTED);
             Ok(())
         }
         _ => Ok(()),

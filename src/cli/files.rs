@@ -1,7 +1,7 @@
 //! Reading and writing files with messages that name them.
 
 use super::{Failure, plain};
-use pcadlang::lang::load::reason;
+use pcadlang::lang::load::{embedded, reason};
 use pcadlang::lang::reach::read_file;
 use pcadlang::vision::{Limits, Photo, photo};
 use std::path::Path;
@@ -20,4 +20,13 @@ pub fn write(path: &Path, bytes: &[u8]) -> Result<(), Failure> {
 pub fn photo(path: &Path) -> Result<Photo, Failure> {
     let bytes = read(path)?;
     photo::decode(&bytes, &Limits::default()).map_err(|e| plain(format!("{}: {e}", path.display())))
+}
+
+/// A program as it is named on the command line: `lathe` means `lathe.pcad`, unless there is a file of that name.
+pub fn program_name(text: &str) -> Result<String, std::convert::Infallible> {
+    let path = Path::new(text);
+    let full = format!("{text}.pcad");
+    let is_short = path.extension().is_none() && !path.exists();
+    let there = Path::new(&full).exists() || embedded(&full).is_some();
+    Ok(if is_short && there { full } else { text.to_owned() })
 }

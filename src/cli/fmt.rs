@@ -23,17 +23,17 @@ pub fn fmt(a: &Fmt) -> Result<(), Failure> {
         let name = path.display().to_string();
         match formatted(&name, &files::read(path)?) {
             Err(message) => {
-                eprint!("{message}");
+                error_text!("{message}");
                 failed += 1;
             }
             Ok(None) => {}
             Ok(Some(_)) if a.check => {
-                println!("{name}");
+                print_line!("{name}");
                 changed += 1;
             }
             Ok(Some(text)) => {
                 replace(path, text.as_bytes()).map_err(|e| plain(format!("cannot write {name}: {}", reason(&e))))?;
-                println!("{name}: formatted");
+                print_line!("{name}: formatted");
             }
         }
     }
@@ -53,7 +53,7 @@ fn standard_input(check: bool) -> Result<(), Failure> {
     std::io::stdin().read_to_end(&mut bytes).map_err(|e| plain(format!("cannot read standard input: {e}")))?;
     match formatted("<stdin>", &bytes) {
         Err(message) => {
-            eprint!("{message}");
+            error_text!("{message}");
             Err(plain("the program does not parse"))
         }
         Ok(Some(_)) if check => Err(plain("the program would change")),

@@ -17,7 +17,7 @@ pub fn program(given: &Given, quiet: bool) -> Result<Program, Failure> {
     let mut program = Program::open_allowing(&given.program, &given.allowed.allow_read)?;
     if !quiet {
         for path in program.embedded().iter().filter(|p| p.ends_with(".pcad") && !p.starts_with("std/")) {
-            eprintln!("note: using the shipped {path}");
+            error_line!("note: using the shipped {path}");
         }
     }
     let limits = given.allowed.limits.iter().try_fold(Bounds::default(), |l, (name, n)| l.with(name, *n));

@@ -9,12 +9,13 @@ use super::places::{best_of_each, show_places};
 use super::progress::{self, Ending};
 use super::{Failure, edges, files, given, people, plain};
 use pcadlang::bank::BankFiles;
-use pcadlang::infer::draws::{KernelStats, Sink, SiteStats};
+use pcadlang::infer::draws::{KernelStats, MOST_POINTS, Sink, SiteStats};
 use pcadlang::infer::{BestSoFar, BestState, ChainResult, Evidence, Progress, Watch, Watches};
 use pcadlang::lang::{self, builtins::scene::ImageValue};
 use pcadlang::report::html::{MeshData, Page, page};
 use pcadlang::report::{
-    ChainDraws, ChainFiles, Memory, Mode, Quantity, RunDir, bytes_hash, modes, quantities, seconds, table, text_hash,
+    ChainDraws, ChainFiles, Memory, Mode, Quantity, RunDir, align, bytes_hash, modes, quantities, seconds, table,
+    text_hash, widen, zarr,
 };
 use pcadlang::vision::Photo;
 use pcadlang::{Model, RunOptions};
@@ -54,7 +55,7 @@ pub struct Outcome {
     pub approximate: Vec<String>,
     /// The chains.
     pub chains: Vec<ChainResult>,
-    /// The summary is of each so-manieth draw: 1, unless there are more than fit the memory.
+    /// The summary is of every n-th draw: 1, unless there are more than fit the memory.
     pub every: u64,
     /// Wall time until everything but the page was written.
     pub seconds: f64,
@@ -88,6 +89,9 @@ fn kernel_seconds(kernels: &[KernelStats]) -> f64 {
 pub fn summaries(quantities: &[Quantity], seconds: f64) -> Map<String, Value> {
     let one = |q: &Quantity| {
         let mut s = json!(q.summary);
+        if let Some(reason) = q.why_no_r_hat() {
+            s["r_hat_reason"] = json!(reason);
+        }
         s["ess_per_second"] = json!(table::per_second(q.summary.ess_bulk, seconds));
         (q.name.clone(), s)
     };
@@ -281,6 +285,7 @@ pub fn options(job: &Job, ready: &Ready, watch: Option<Arc<dyn Watch>>) -> RunOp
         watch,
         banks: Some(Arc::new(BankFiles::new(model, folder(&job.given.program), job.features_from.clone()))),
         sites: true,
+        pointwise: true,
     }
 }
 
@@ -315,7 +320,17 @@ fn fill(
     let sampled = begun.elapsed().as_secs_f64();
 
     let chains = results.into_iter().collect::<Result<Vec<_>, _>>().map_err(|e| model.chain_error(e))?;
-    let draws: Vec<ChainDraws> = memories.iter().map(Memory::draws).collect();
+    let mut draws: Vec<ChainDraws> = memories.iter().map(Memory::draws).collect();
+    // A run that may go on keeps all that it has.
+    let kept = align(dir.path(), s.chains(), !interrupted);
+    let kept = kept.map_err(|e| plain(format!("{}: {e}; its draws are kept", dir.path().display())))?;
+    if let Some(kept) = kept {
+        draws.iter_mut().for_each(|d| d.rows.retain(|r| r.draw < kept));
+    }
+    widen(&mut draws);
+    let points = chains.first().map_or_else(Vec::new, |c| c.last.points(MOST_POINTS));
+    let zarr = zarr::write(dir.path(), &draws, &points);
+    zarr.map_err(|e| plain(format!("{}: {e}; what was written before is kept", dir.file(zarr::ZARR).display())))?;
     let quantities = quantities(&draws);
     let every = draws.iter().map(|d| d.every).max().unwrap_or(1);
     let kernels = table::merged(chains.iter().map(|c| &c.kernels[..]));
@@ -349,6 +364,7 @@ fn fill(
         modes: &modes,
         kernels: &kernels,
         warnings: &warnings,
+        approximate: &approximate,
         mesh: drawn.mesh.as_ref().map(|m| MeshData { positions: &drawn.positions, triangles: &m.topology.triangles }),
         program: model.text(),
     });
@@ -388,7 +404,13 @@ fn counts(chains: &[ChainResult], best: Option<&BestState>, quantities: &[Quanti
         .collect();
     let best = best.map(|b| b.log_joint);
     let r_hat = quantities.iter().map(|q| q.summary.r_hat).filter(|r| !r.is_nan()).max_by(f64::total_cmp);
-    let all = [("chains", json!(each)), ("best_log_joint", json!(best)), ("r_hat_max", json!(r_hat))];
+    // Chains at rest at different values have none, and the others' would say too little.
+    let stuck = quantities.iter().find(|q| q.is_stuck());
+    let r_hat = if stuck.is_some() { None } else { r_hat };
+    let mut all = vec![("chains", json!(each)), ("best_log_joint", json!(best)), ("r_hat_max", json!(r_hat))];
+    if let (None, Some(q)) = (r_hat, stuck.or(quantities.first())) {
+        all.push(("r_hat_max_reason", json!(q.why_no_r_hat().map(|why| format!("{}: {why}", q.name)))));
+    }
     all.into_iter().map(|(k, v)| (k.to_owned(), v)).collect()
 }
 

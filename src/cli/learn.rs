@@ -39,7 +39,7 @@ pub fn learn(a: &Learn) -> Result<(), Failure> {
     })?;
     if !a.quiet {
         let took = seconds(begun.elapsed().as_secs_f64());
-        println!("{}: {} scenes from the prior in {took}, seed {}", a.out.display(), a.n, a.seed);
+        print_line!("{}: {} scenes from the prior in {took}, seed {}", a.out.display(), a.n, a.seed);
     }
     Ok(())
 }

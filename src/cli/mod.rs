@@ -1,5 +1,8 @@
 //! The commands. Only these modules print; everything they do is the library's.
 
+#[macro_use]
+mod print;
+
 pub mod args;
 mod best;
 mod calibrate;

@@ -46,13 +46,13 @@ pub fn predict(a: &Predict) -> Result<(), Failure> {
     };
     let dir = dir.map_err(|e| plain(e.to_string()))?;
     write(&dir, "predictive.csv", csv(&now, &draws).as_bytes())?;
-    print!("{}", compared(what, &now, &draws));
+    print_text!("{}", compared(what, &now, &draws));
     for (name, what) in silent {
-        println!("note: {name} is {what}: it is left out");
+        print_line!("note: {name} is {what}: it is left out");
     }
     let count: usize = draws.iter().map(Vec::len).sum();
     let took = seconds(begun.elapsed().as_secs_f64());
-    println!("seed {}, {count} draws from the {what} in {took}\n{}", a.job.sampling.seed, dir.path().display());
+    print_line!("seed {}, {count} draws from the {what} in {took}\n{}", a.job.sampling.seed, dir.path().display());
     Ok(())
 }
 

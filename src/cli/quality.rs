@@ -100,7 +100,7 @@ pub fn filled(job: &Job, quiet: bool) -> Result<Job, Failure> {
     let mut job = job.clone();
     let keypoints = job.keypoints.is_some();
     if let (Some(said), false) = (apply(&mut job, keypoints)?, quiet) {
-        eprintln!("note: {said}");
+        error_line!("note: {said}");
     }
     Ok(job)
 }

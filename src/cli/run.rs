@@ -14,7 +14,7 @@ pub fn run(a: &Run) -> Result<(), Failure> {
     let ready = job::prepare(job, a.quiet)?;
     let (_, default_plan) = ready.model.plan()?;
     if let (Some(text), false) = (&default_plan, a.quiet) {
-        eprintln!("note: the program has no `infer` block; this plan is used, copy and edit it:\n{text}");
+        error_line!("note: the program has no `infer` block; this plan is used, copy and edit it:\n{text}");
     }
     let interrupt = Interrupt::listen();
     let record = job::record(job, ready.model.hash(), &job::inputs_hash(job, &ready.model)?);
@@ -50,7 +50,7 @@ fn show(a: &Run, job: &Job, dir: &RunDir, o: &Outcome, explained: Option<&Explan
         if let Some(explained) = explained {
             said["explained"] = explained.json();
         }
-        println!("{said}");
+        print_line!("{said}");
         return;
     }
     if a.quiet {
@@ -59,41 +59,44 @@ fn show(a: &Run, job: &Job, dir: &RunDir, o: &Outcome, explained: Option<&Explan
     let modes = modes_table(&o.modes, &o.quantities);
     let gap = if modes.is_empty() { "" } else { "\n" };
     let quantities = table::quantities(&o.quantities, o.kernel_seconds());
-    print!("{quantities}{gap}{modes}\n{}", table::kernels(&o.kernels));
+    print_text!("{quantities}{gap}{modes}\n{}", table::kernels(&o.kernels));
     let sites = table::sites(&o.sites);
     if !sites.is_empty() {
-        print!("\n{sites}");
+        print_text!("\n{sites}");
     }
     if let Some(explained) = explained {
-        print!("\n{}\n", explained.text());
+        print_text!("\n{}\n", explained.text());
     }
     for w in &o.warnings {
-        println!("warning: {w}");
+        print_line!("warning: {w}");
     }
-    for a in &o.approximate {
-        println!("approximate: {a}");
+    match &o.approximate[..] {
+        [] => {}
+        all if a.verbose => all.iter().for_each(|a| print_line!("approximate: {a}")),
+        [one] => print_line!("approximate: {one}"),
+        all => print_line!("approximate: {} things, listed in the report and with --verbose", all.len()),
     }
     if o.chains.first().is_some_and(|c| c.last.is_pseudo()) {
-        println!(
-            "note: a likelihood is no density over its data, so intervals depend on its scale (a pseudo-posterior)"
+        print_line!(
+            "note: the image score is not a normalised likelihood: the widths of intervals depend on its scale (a pseudo-posterior)"
         );
     }
     if o.every > 1 {
-        println!("note: the summary is of one draw in {}; the files of the chains have all", o.every);
+        print_line!("note: the summary is of one draw in {}; the files of the chains have all", o.every);
     }
     let steps: u64 = o.chains.iter().map(|c| c.steps + c.warmup).sum();
     let most = o.chains.iter().map(|c| (c.steps, c.warmup)).max().unwrap_or_default();
-    println!("seed {seed}, {} chains, {steps} steps in {}", o.chains.len(), seconds(o.seconds));
+    print_line!("seed {seed}, {} chains, {steps} steps in {}", o.chains.len(), seconds(o.seconds));
     if job.sampling.time.is_some() {
-        println!("the longest chain again: --steps {} --warmup {}{}", most.0, most.1, quality::again(job));
+        print_line!("the longest chain again: --steps {} --warmup {}{}", most.0, most.1, quality::again(job));
     }
     if o.interrupted {
-        println!(
+        print_line!(
             "interrupted: every draw so far is kept; to go on, the same command with --resume --out {}",
             shown(dir)
         );
     }
-    println!("{}", dir.path().display());
+    print_line!("{}", dir.path().display());
 }
 
 /// A folder as it is written on a command line.

@@ -33,14 +33,14 @@ pub fn sample(a: &Sample) -> Result<(), Failure> {
     if pictures.is_empty() {
         let head = std::iter::once("draw".to_owned()).chain(model.code().assumed.iter().map(|(n, _)| n.to_string()));
         rows.insert(0, head.collect());
-        print!("{}", table::aligned(&rows));
-        println!("seed {}", a.seed);
+        print_text!("{}", table::aligned(&rows));
+        print_line!("seed {}", a.seed);
         return Ok(());
     }
     let columns = (a.n as f64).sqrt().ceil() as u32;
     let sheet = png(&contact_sheet(&pictures, columns)).map_err(|e| plain(e.to_string()))?;
     files::write(&a.out, &sheet)?;
-    println!("{}: {} draws from the prior, seed {}", a.out.display(), pictures.len(), a.seed);
+    print_line!("{}: {} draws from the prior, seed {}", a.out.display(), pictures.len(), a.seed);
     Ok(())
 }
 

@@ -20,13 +20,13 @@ pub fn is_live() -> bool {
 pub fn fail(failure: Failure) -> u8 {
     match failure {
         Failure::Program(e) => {
-            eprint!("{}", render(&e.sources, &e.diagnostics, has_colors()));
+            error_text!("{}", render(&e.sources, &e.diagnostics, has_colors()));
             1
         }
         Failure::Plain(message, hint) => {
-            eprintln!("error: {message}");
+            error_line!("error: {message}");
             if let Some(h) = hint {
-                eprintln!("  = hint: {h}");
+                error_line!("  = hint: {h}");
             }
             1
         }

@@ -24,7 +24,7 @@ pub fn watch(a: &Check) -> Result<(), Failure> {
         if let Err(failure) = check::check(a) {
             term::fail(failure);
         }
-        println!("\nWatching {}; Ctrl-C ends.", files(seen.0.len()));
+        print_line!("\nWatching {}; Ctrl-C ends.", files(seen.0.len()));
         loop {
             if interrupt.asked() {
                 return Ok(());
@@ -32,7 +32,7 @@ pub fn watch(a: &Check) -> Result<(), Failure> {
             std::thread::sleep(EVERY);
             let changed = seen.changed();
             if !changed.is_empty() {
-                println!("Changed: {}", changed.join(", "));
+                print_line!("Changed: {}", changed.join(", "));
                 break;
             }
         }
@@ -46,7 +46,7 @@ fn files(n: usize) -> String {
 /// Clears the screen, where there is one.
 fn clear() {
     if io::stdout().is_terminal() {
-        print!("\x1b[2J\x1b[3J\x1b[H");
+        print_text!("\x1b[2J\x1b[3J\x1b[H");
     }
 }
 

@@ -4,7 +4,7 @@ use super::param::probability;
 use super::{Datum, Distribution, Gradient, ParamError, Support};
 use crate::rng::Stream;
 
-/// `flip(p)`: true with probability `p`.
+/// `flip(p)`: true with probability `p`. Scores 1 and 0 as true and false.
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub struct Flip {
     p: f64,
@@ -20,6 +20,16 @@ impl Flip {
     #[inline]
     pub fn log_probability(&self, x: bool) -> f64 {
         if x { libm::log(self.p) } else { libm::log1p(-self.p) }
+    }
+
+    /// The truth value that is observed: data often have 1 and 0 for true and false.
+    fn truth(x: &Datum) -> Option<bool> {
+        match x {
+            Datum::Bool(x) => Some(*x),
+            Datum::Num(1.0) => Some(true),
+            Datum::Num(0.0) => Some(false),
+            _ => None,
+        }
     }
 
     /// Its derivative by the probability, where it is finite.
@@ -44,19 +54,12 @@ impl Distribution for Flip {
 
     #[inline]
     fn log_density(&self, x: &Datum) -> f64 {
-        match x {
-            Datum::Bool(x) => self.log_probability(*x),
-            _ => f64::NEG_INFINITY,
-        }
+        Flip::truth(x).map_or(f64::NEG_INFINITY, |x| self.log_probability(x))
     }
 
     fn gradient(&self, x: &Datum) -> Option<Gradient> {
-        match x {
-            Datum::Bool(x) if self.log_probability(*x).is_finite() => {
-                Some(Gradient { x: Vec::new(), params: vec![self.slope(*x)] })
-            }
-            _ => None,
-        }
+        let x = Flip::truth(x).filter(|x| self.log_probability(*x).is_finite())?;
+        Some(Gradient { x: Vec::new(), params: vec![self.slope(x)] })
     }
 
     fn mean(&self) -> Option<f64> {

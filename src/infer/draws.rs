@@ -1,65 +1,16 @@
 //! What inference hands out: draws, one row at a time, and what the kernels did.
 //!
 //! Plain data and the [`Sink`] they flow into; where draws go (a file, memory, a progress line) is the sink's business.
-//! Invariant: the values of every row have the length [`width`] of the columns announced before the first row.
+//! Invariant: the values of every row have the length [`width`] of the columns announced last.
 
 use super::Checkpoint;
+pub use super::columns::{Column, Layout, Shape, merged, width};
+pub use super::record::{MOST_POINTS, POINTWISE};
 use serde::{Deserialize, Serialize};
 use std::io;
 
-/// How many numbers a column holds in each draw.
-#[derive(Clone, Copy, Debug, PartialEq, Eq, Serialize, Deserialize)]
-pub enum Shape {
-    /// One.
-    Scalar,
-    /// A fixed number of them, maybe none.
-    Vector(usize),
-}
-
-impl Shape {
-    /// The count of numbers.
-    pub fn len(self) -> usize {
-        match self {
-            Shape::Scalar => 1,
-            Shape::Vector(n) => n,
-        }
-    }
-
-    /// Whether it holds nothing.
-    pub fn is_empty(self) -> bool {
-        self.len() == 0
-    }
-}
-
-/// A recorded quantity.
-#[derive(Clone, Debug, PartialEq, Eq, Serialize, Deserialize)]
-pub struct Column {
-    /// Its name; parts of an address are separated by `/`.
-    pub name: String,
-    /// Its shape.
-    pub shape: Shape,
-}
-
-impl Column {
-    /// A column of one number.
-    pub fn scalar(name: impl Into<String>) -> Self {
-        Column { name: name.into(), shape: Shape::Scalar }
-    }
-
-    /// A column of `n` numbers.
-    #[doc(hidden)]
-    pub fn vector(name: impl Into<String>, n: usize) -> Self {
-        Column { name: name.into(), shape: Shape::Vector(n) }
-    }
-}
-
-/// The count of numbers in a row.
-pub fn width(columns: &[Column]) -> usize {
-    columns.iter().map(|c| c.shape.len()).sum()
-}
-
 /// One recorded draw.
-#[derive(Clone, Debug, PartialEq)]
+#[derive(Clone, Debug, Default, PartialEq)]
 pub struct DrawRow {
     /// The chain, from 0.
     pub chain: u32,
@@ -73,13 +24,18 @@ pub struct DrawRow {
     pub log_prior: f64,
     /// The part of it from the observations.
     pub log_likelihood: f64,
+    /// Accepted proposals per proposal since the draw before it; NaN if there was none.
+    pub acceptance: f64,
+    /// Divergent trajectories since the draw before it.
+    pub divergent: u64,
     /// The columns, flattened.
     pub values: Vec<f64>,
 }
 
 /// Where the draws of one chain go.
 pub trait Sink: Send {
-    /// Announces the columns, once, before the first draw.
+    /// Announces the columns: before the first draw, and again when a draw has more than those before it. Then each of the
+    /// earlier columns is among the new ones, maybe longer; earlier draws have NaN for what they lack ([`Layout`]).
     ///
     /// # Errors
     /// If they cannot be written.

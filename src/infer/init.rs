@@ -16,6 +16,7 @@ use crate::rng::{Purpose, StreamKey};
 use crate::syntax::ast::{Expr, KStmt, KStmtKind};
 use crate::syntax::span::Span;
 use crate::trace::{Draws, Limits, Trace, TraceResult};
+use std::collections::HashMap;
 use std::fmt;
 use std::sync::Arc;
 use std::time::Duration;
@@ -65,6 +66,8 @@ pub struct ZeroTerm {
     pub address: Address,
     /// Its place in the program.
     pub span: Span,
+    /// What is observed there that its distribution cannot give.
+    pub outside: Option<String>,
 }
 
 impl fmt::Display for NoStart {
@@ -160,7 +163,9 @@ pub(crate) fn starts_from(
 
 /// Which terms of a trace have no probability.
 fn explain(t: &Trace) -> NoStart {
-    let zero = t.impossible().into_iter().map(|(address, span)| ZeroTerm { address, span });
+    let mut outside: HashMap<Address, String> = t.outside_support().into_iter().collect();
+    let zero = t.impossible().into_iter();
+    let zero = zero.map(|(address, span)| ZeroTerm { outside: outside.remove(&address), address, span });
     let single = |(address, value, _): (Address, Value, _)| match value {
         Value::Num(_) | Value::Bool(_) => Some((address, value)),
         _ => None,

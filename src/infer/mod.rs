@@ -7,6 +7,7 @@ mod build;
 #[doc(hidden)]
 pub mod calibration;
 mod chains;
+mod columns;
 mod default_plan;
 #[doc(hidden)]
 pub mod diagnostics;

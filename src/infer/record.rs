@@ -1,6 +1,6 @@
 //! Recording draws: which columns there are, and flattening values into them.
 
-use super::draws::{Column, Shape};
+use super::draws::{Column, Shape, merged};
 use crate::lang::code::Code;
 use crate::lang::error::RunError;
 use crate::lang::value::Value;
@@ -12,12 +12,19 @@ use crate::trace::{Draws, Trace};
 pub(crate) struct Recorder {
     collects: bool,
     columns: Vec<Column>,
+    /// The observations of the first draw: the hash of each one's address, and how many values it observes.
+    observed: Option<Vec<(u64, usize)>>,
 }
+
+/// The column of the log density of each observed value, as Stan's programs and ArviZ call it.
+pub const POINTWISE: &str = "log_lik";
+/// So many observed values get one each.
+pub const MOST_POINTS: usize = 1000;
 
 impl Recorder {
     /// A recorder for a plan.
     pub fn new(_code: &Code, plan: &[KStmt]) -> Self {
-        Recorder { collects: plan.iter().any(collects), columns: Vec::new() }
+        Recorder { collects: plan.iter().any(collects), columns: Vec::new(), observed: None }
     }
 
     /// Whether the plan says itself what to collect.
@@ -25,7 +32,7 @@ impl Recorder {
         self.collects
     }
 
-    /// The columns, once the first draw has fixed them.
+    /// The columns of all draws so far.
     pub fn columns(&self) -> &[Column] {
         &self.columns
     }
@@ -69,43 +76,88 @@ impl Recorder {
         Ok(names.into_iter().zip(trace.query(&operands, draws)?).collect())
     }
 
-    /// Fixes the columns by the first draw: numbers, bools, arrays and records of them are kept, anything else is left out.
-    pub fn fix_columns(&mut self, values: &[(String, Value)]) {
-        self.columns.clear();
-        for (name, v) in values {
-            self.add_columns(name, v);
-        }
+    /// The observations that there are log densities of.
+    pub fn observed(&self) -> &Option<Vec<(u64, usize)>> {
+        &self.observed
     }
 
-    fn add_columns(&mut self, name: &str, v: &Value) {
-        match v {
-            Value::Num(_) | Value::Bool(_) => self.columns.push(Column { name: name.into(), shape: Shape::Scalar }),
-            Value::Array(_) | Value::List(_) => {
-                let mut flat = Vec::new();
-                flatten(v, &mut flat);
-                self.columns.push(Column { name: name.into(), shape: Shape::Vector(flat.len()) });
-            }
-            Value::Record(r) => r.iter().for_each(|(k, v)| self.add_columns(&format!("{name}/{k}"), v)),
-            _ => {}
-        }
+    /// Takes them up from a checkpoint.
+    pub fn set_observed(&mut self, observed: Option<Vec<(u64, usize)>>) {
+        self.observed = observed;
     }
 
-    /// One number a column: what is missing is NaN, what is too much is left out.
-    pub fn flatten(&self, values: &[(String, Value)]) -> Vec<f64> {
+    /// Adds the log density of each observed value, if there are not too many of them; NaN where others are observed than in the
+    /// first draw.
+    pub fn add_pointwise(&mut self, trace: &Trace, values: &mut Vec<(String, Value)>) {
+        let is_first = self.columns.is_empty();
+        if values.iter().any(|(name, _)| name == POINTWISE) || !is_first && self.observed.is_none() {
+            return;
+        }
+        let all = trace.pointwise(MOST_POINTS).unwrap_or_default();
+        let here = || all.iter().map(|(hash, scores)| (*hash, scores.len()));
+        if is_first && !all.is_empty() {
+            self.observed = Some(here().collect());
+        }
+        let Some(known) = &self.observed else { return };
+        let scores: Vec<f64> = match here().eq(known.iter().copied()) {
+            true => all.into_iter().flat_map(|(_, scores)| scores).collect(),
+            false => vec![f64::NAN; known.iter().map(|(_, n)| n).sum()],
+        };
+        values.push((POINTWISE.into(), Value::array(scores)));
+    }
+
+    /// One number a column, NaN where a column has none in this draw; and whether the draw has more than the draws before it, for
+    /// which columns came. Numbers, bools, arrays and records of them are kept, anything else is left out.
+    pub fn row(&mut self, values: &[(String, Value)]) -> (Vec<f64>, bool) {
+        let (row, fits) = self.flatten(values);
+        if fits {
+            return (row, false);
+        }
+        let mut here = Vec::new();
+        values.iter().for_each(|(name, v)| add_columns(name, v, &mut here));
+        let before = self.columns.clone();
+        self.columns = if before.is_empty() { here } else { merged(&before, &here) };
+        (self.flatten(values).0, self.columns != before)
+    }
+
+    /// The row, and whether all of the values are in it.
+    fn flatten(&self, values: &[(String, Value)]) -> (Vec<f64>, bool) {
         let mut row = Vec::new();
+        let (mut found, mut fits) = (0, true);
         for c in &self.columns {
             let mut flat = Vec::new();
             if let Some(v) = find(values, &c.name) {
                 flatten(v, &mut flat);
+                found += 1;
             }
-            let want = match c.shape {
-                Shape::Scalar => 1,
-                Shape::Vector(n) => n,
-            };
-            flat.resize(want, f64::NAN);
+            fits &= flat.len() <= c.shape.len();
+            flat.resize(c.shape.len(), f64::NAN);
             row.extend(flat);
         }
-        row
+        let asked: usize = values.iter().map(|(_, v)| leaves(v)).sum();
+        (row, fits && found >= asked)
+    }
+}
+
+fn add_columns(name: &str, v: &Value, columns: &mut Vec<Column>) {
+    match v {
+        Value::Num(_) | Value::Bool(_) => columns.push(Column { name: name.into(), shape: Shape::Scalar }),
+        Value::Array(_) | Value::List(_) => {
+            let mut flat = Vec::new();
+            flatten(v, &mut flat);
+            columns.push(Column { name: name.into(), shape: Shape::Vector(flat.len()) });
+        }
+        Value::Record(r) => r.iter().for_each(|(k, v)| add_columns(&format!("{name}/{k}"), v, columns)),
+        _ => {}
+    }
+}
+
+/// How many columns a value has.
+fn leaves(v: &Value) -> usize {
+    match v {
+        Value::Num(_) | Value::Bool(_) | Value::Array(_) | Value::List(_) => 1,
+        Value::Record(r) => r.values().map(leaves).sum(),
+        _ => 0,
     }
 }
 

@@ -1,6 +1,6 @@
 //! Densities of values of the language and their derivatives: what observations and choices are scored by, whatever scores them.
 
-use crate::dist::{Datum, Dist, Flat};
+use crate::dist::{Datum, Dist, Flat, Support};
 use crate::lang::adjoint::Adjoint;
 use crate::lang::builtins::{Args, CovarianceValue};
 use crate::lang::error::Fault;
@@ -54,6 +54,7 @@ pub(crate) fn score(dist: &Dist, observed: &Value) -> Result<Score, Fault> {
         Value::Num(x) if x.is_nan() => Err(nan()),
         Value::Array(xs) if xs.iter().any(|x| x.is_nan()) => Err(nan()),
         Value::Num(x) => Ok(Score::One(dist.log_density(&Datum::Num(*x)))),
+        Value::Array(xs) if is_truth(dist) => sum_scores(xs.len(), |i| Ok(dist.log_density(&Datum::Num(xs[i])))),
         Value::Bool(b) => Ok(Score::One(dist.log_density(&Datum::Bool(*b)))),
         Value::Array(xs) if dist.is_scalar() => sum_scores(xs.len(), |i| Ok(dist.log_density(&Datum::Num(xs[i])))),
         Value::List(_) if observed.to_datum().is_some_and(|x| dist.support().fits(&x)) => {
@@ -67,6 +68,34 @@ pub(crate) fn score(dist: &Dist, observed: &Value) -> Result<Score, Fault> {
     }
 }
 
+/// The log density of each value that is observed: their sum is the [`score`]. NaN of what has none.
+pub(crate) fn pointwise(dist: &Dist, observed: &Value) -> Vec<f64> {
+    let one = |d: &Dist, x: Option<Datum>| x.map_or(f64::NAN, |x| d.log_density(&x));
+    let element = |i: usize| observed.element(i).as_ref().and_then(Value::to_datum);
+    if let Some(count) = dist.elements() {
+        let log_density = |i| element(i).map_or(f64::NAN, |x| dist.element_log_density(i, &x));
+        return (0..count).map(log_density).collect();
+    }
+    match observed.len() {
+        Some(count) if is_repeated(dist, observed) => (0..count).map(|i| one(dist, element(i))).collect(),
+        _ => vec![one(dist, observed.to_datum())],
+    }
+}
+
+/// Whether a value is many of what a distribution gives, each observed by itself.
+pub(crate) fn is_repeated(dist: &Dist, observed: &Value) -> bool {
+    match observed {
+        Value::Array(_) => dist.is_scalar() || is_truth(dist),
+        Value::List(_) => !observed.to_datum().is_some_and(|x| dist.support().fits(&x)),
+        _ => false,
+    }
+}
+
+/// Whether it is over a truth value: of an array of numbers each is one, 1 or 0.
+fn is_truth(dist: &Dist) -> bool {
+    !dist.is_scalar() && dist.support() == Support::Boolean
+}
+
 fn sum_scores(count: usize, mut score: impl FnMut(usize) -> Result<f64, Fault>) -> Result<Score, Fault> {
     let mut sum = ExactSum::default();
     for i in 0..count {
@@ -78,7 +107,7 @@ fn sum_scores(count: usize, mut score: impl FnMut(usize) -> Result<f64, Fault>) 
 /// The derivatives of the log density of a value: by the value, in its shape, and by the parameters. As scored, many values
 /// under a distribution of one number are independent.
 pub(crate) fn gradient(dist: &Dist, value: &Value) -> Option<(Adjoint, Vec<f64>)> {
-    if let (Value::Array(xs), true) = (value, dist.is_scalar()) {
+    if let (Value::Array(xs), true) = (value, dist.is_scalar() || is_truth(dist)) {
         let (mut by_x, mut params) = (Vec::with_capacity(xs.len()), Vec::new());
         for x in xs.iter() {
             let g = dist.gradient(&Datum::Num(*x))?;

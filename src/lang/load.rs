@@ -110,6 +110,9 @@ pub struct Loaded {
     pub embedded: Vec<String>,
 }
 
+/// What the names of programs end with.
+const PCAD: &str = ".pcad";
+
 /// At most this many includes, nested ones counted.
 const MAX_INCLUDES: usize = 256;
 
@@ -122,9 +125,12 @@ pub fn load(path: &str, loader: &dyn Loader, map: &mut SourceMap) -> Result<Load
         Ok(found) => found,
         Err(e) => {
             let d = Diagnostic::new(crate::diag::Severity::Error, format!("cannot read {path}: {}", reason(&e)));
-            let near = crate::diag::nearest(path, EMBEDDED.iter().map(|(n, _)| *n));
+            // The ending is no part of what a name is like.
+            let stem = |path: &'static str| path.strip_suffix(PCAD).unwrap_or(path);
+            let wanted = path.strip_suffix(PCAD).unwrap_or(path);
+            let near = crate::diag::nearest(wanted, shipped().map(stem));
             return Err(vec![match near {
-                Some(n) => d.hint(format!("did you mean the shipped program {n}?")),
+                Some(n) => d.hint(format!("did you mean the shipped program {n}{PCAD}?")),
                 None => d.hint(format!("shipped programs are {}", shipped().collect::<Vec<_>>().join(", "))),
             }]);
         }

@@ -2,6 +2,7 @@
 //!
 //! Invariant: the checkpoint is whole, and what it says is in the file of draws is there, whenever the process or the machine stops.
 
+use super::aligned::{draws_name, restore};
 use super::checkpoint::SavedChain;
 use super::csv::{CsvSink, DrawReader};
 use super::rundir::RunDir;
@@ -32,11 +33,6 @@ pub struct ChainFiles<'a> {
     pub comments: &'a [(&'a str, String)],
 }
 
-/// The name of a chain's draws; chains are counted from 0.
-fn draws_name(chain: u32) -> String {
-    format!("chain-{}.csv", u64::from(chain) + 1)
-}
-
 fn checkpoint_name(chain: u32) -> String {
     format!("chain-{}.checkpoint", u64::from(chain) + 1)
 }
@@ -59,6 +55,7 @@ impl ChainFiles<'_> {
         if checkpoint.exists() {
             std::fs::remove_file(checkpoint)?;
         }
+        restore(self.dir.path(), chain).map_err(told)?;
         let draws = CsvSink::create(&self.dir.file(&name), chain, self.comments).map_err(told)?;
         Ok(self.file(chain, draws, memory.clone(), None))
     }
@@ -81,6 +78,7 @@ impl ChainFiles<'_> {
         let (saved, checkpoint) = read.map_err(|e| about(&name, e, io::ErrorKind::InvalidData))?;
         let name = draws_name(chain);
         let told = |e: io::Error| about(&name, &e, e.kind());
+        restore(self.dir.path(), chain).map_err(told)?;
         let mut file = File::options().read(true).write(true).open(self.dir.file(&name)).map_err(told)?;
         let mut memory = memory.clone();
         memory.columns(checkpoint.columns())?;

@@ -1,7 +1,8 @@
 //! The draws of a chain in memory, and the scalar quantities they give.
 
 use crate::infer::diagnostics::{Summary, summary};
-use crate::infer::draws::{Column, DrawRow, Shape};
+use crate::infer::draws::{Column, DrawRow, Layout, POINTWISE, Shape, merged, width};
+use std::borrow::Cow;
 
 /// The draws of one chain.
 #[derive(Clone, Debug, PartialEq)]
@@ -22,6 +23,57 @@ impl Default for ChainDraws {
     }
 }
 
+impl Quantity {
+    /// Why there is no R-hat; `None` if there is one.
+    pub fn why_no_r_hat(&self) -> Option<&'static str> {
+        if !self.summary.r_hat.is_nan() {
+            return None;
+        }
+        let draws = || self.chains.iter().flatten();
+        Some(match () {
+            () if self.chains.len() < 2 => "a single chain",
+            () if self.chains.iter().any(|c| c.len() < 4) => "fewer than 4 draws a chain",
+            () if draws().any(|x| x.is_nan()) => "it is not there in every draw",
+            () if !draws().all(|x| x.is_finite()) => "it is infinite in some draws",
+            () if self.is_stuck() => "it never moved in any chain, and the chains are at different values",
+            () => "it never moved",
+        })
+    }
+
+    /// Whether each chain stays where it is, and not all at one value.
+    #[doc(hidden)]
+    pub fn is_stuck(&self) -> bool {
+        let same = |xs: &[f64]| xs.windows(2).all(|w| w[0].to_bits() == w[1].to_bits());
+        let firsts: Vec<f64> = self.chains.iter().filter_map(|c| c.first().copied()).collect();
+        self.chains.iter().all(|c| same(c)) && !same(&firsts)
+    }
+}
+
+impl ChainDraws {
+    /// Puts the draws in other columns, among which theirs are.
+    pub fn widen(&mut self, columns: Vec<Column>) {
+        let layout = Layout::new(&self.columns, &columns);
+        if !layout.is_same(width(&self.columns)) {
+            self.rows.iter_mut().for_each(|r| r.values = layout.apply(&r.values));
+        }
+        self.columns = columns;
+    }
+}
+
+/// Brings chains to the same columns: those that any of them has, with NaN where a draw has none.
+pub fn widen(chains: &mut [ChainDraws]) {
+    let Some(all) = common(chains) else { return };
+    chains.iter_mut().filter(|c| !c.rows.is_empty()).for_each(|c| c.widen(all.clone()));
+}
+
+/// The columns of all chains together, if they have not the same ones.
+fn common(chains: &[ChainDraws]) -> Option<Vec<Column>> {
+    let mut each = chains.iter().map(|c| &c.columns).filter(|c| !c.is_empty());
+    let first = each.next()?;
+    let others: Vec<_> = each.filter(|c| *c != first).collect();
+    (!others.is_empty()).then(|| others.into_iter().fold(first.clone(), |all, c| merged(&all, c)))
+}
+
 /// One number per draw, over all chains.
 #[derive(Clone, Debug)]
 pub struct Quantity {
@@ -35,10 +87,15 @@ pub struct Quantity {
     pub summary: Summary,
 }
 
-/// Every scalar quantity of some chains, the log joint density (`log_joint`) first, with its summary. Columns are those
-/// of the first chain that has any; a chain whose draws lack one has none of it. A column that says the log joint density
-/// again is left out.
+/// Every scalar quantity of some chains, the log joint density (`log_joint`) first, with its summary. Columns are those that any
+/// chain has; what a draw lacks is NaN. A column that says the log joint density again is left out, and
+/// so are the log densities of single observed values.
 pub fn quantities(chains: &[ChainDraws]) -> Vec<Quantity> {
+    let mut chains = Cow::Borrowed(chains);
+    if common(&chains).is_some() {
+        widen(chains.to_mut());
+    }
+    let chains = &chains[..];
     let quantity = |name: String, column, value: &dyn Fn(&DrawRow) -> Option<f64>| {
         let series: Vec<Vec<f64>> = chains.iter().map(|c| c.rows.iter().filter_map(value).collect()).collect();
         Quantity { name, column, summary: summary(&series), chains: series }
@@ -47,6 +104,11 @@ pub fn quantities(chains: &[ChainDraws]) -> Vec<Quantity> {
     let columns = chains.iter().map(|c| &c.columns[..]).find(|c| !c.is_empty()).unwrap_or_default();
     let mut at = 0;
     for (index, column) in columns.iter().enumerate() {
+        if column.name == POINTWISE {
+            // There are as many as data, for comparing models (`az.loo`), and nothing of the posterior.
+            at += column.shape.len();
+            continue;
+        }
         if column.name == out[0].name && column.shape == Shape::Scalar && repeats(chains, at) {
             at += 1;
             continue;
@@ -83,6 +145,7 @@ mod tests {
             log_prior: 0.0,
             log_likelihood: 0.0,
             values: vec![said, 7.0],
+            ..DrawRow::default()
         };
         let chain = |rows| ChainDraws {
             columns: vec![Column::scalar("log_joint"), Column::scalar("b")],
@@ -105,6 +168,7 @@ mod tests {
             log_prior: 0.0,
             log_likelihood: 0.0,
             values: vec![x, 2.0 * x, 3.0 * x],
+            ..DrawRow::default()
         };
         let chain = |shift: f64| ChainDraws {
             columns: vec![Column::scalar("a"), Column::vector("v", 2)],

@@ -5,6 +5,7 @@
 
 #![doc = include_str!("guide.md")]
 
+mod aligned;
 mod chain_file;
 #[doc(hidden)]
 pub mod checkpoint;
@@ -28,10 +29,16 @@ mod sinks;
 pub mod table;
 mod warnings;
 mod whole;
+#[doc(hidden)]
+pub mod zarr;
 
 pub use crate::infer::diagnostics::Summary;
 #[doc(hidden)]
+pub use aligned::align;
+#[doc(hidden)]
 pub use chain_file::{ChainFile, ChainFiles};
+#[doc(hidden)]
+pub use draws::widen;
 pub use draws::{ChainDraws, Quantity, quantities};
 #[doc(hidden)]
 pub use hash::{bytes_hash, text_hash};

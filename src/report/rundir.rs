@@ -12,7 +12,8 @@ pub const MARK: &str = "run.json";
 /// What it holds while an earlier run is cleared away.
 const CLEARED: &[u8] = b"{}";
 /// What a run writes besides `run.json`, the draws `chain-N.csv`, and what its program exports.
-const WRITTEN: [&str; 13] = [
+const WRITTEN: [&str; 14] = [
+    super::zarr::ZARR,
     "summary.json",
     "best.trace.json",
     "overlay.png",
@@ -77,7 +78,8 @@ impl RunDir {
             write_whole(path, MARK, CLEARED).map_err(io)?;
         }
         for name in names.into_iter().filter(|n| is_partial(n) || is_chain(n) || WRITTEN.contains(n)) {
-            std::fs::remove_file(path.join(name)).map_err(io)?;
+            let path = path.join(name);
+            if path.is_dir() { std::fs::remove_dir_all(path) } else { std::fs::remove_file(path) }.map_err(io)?;
         }
         Ok(RunDir { path: path.to_owned() })
     }
@@ -136,10 +138,11 @@ fn numbered(parent: &Path, name: &str, n: u32) -> PathBuf {
     parent.join(if n == 1 { name.to_owned() } else { format!("{name}-{n}") })
 }
 
-/// Whether a file holds the draws of a chain, or its checkpoint: `chain-N.csv`, `chain-N.checkpoint`.
+/// Whether a file holds draws of a chain, or its checkpoint: `chain-N.csv`, `draws-N.csv`, `chain-N.checkpoint`.
 fn is_chain(name: &str) -> bool {
-    let rest = name.strip_prefix("chain-");
-    let number = rest.and_then(|n| n.strip_suffix(".csv").or_else(|| n.strip_suffix(".checkpoint")));
+    let csv = |prefix: &str| name.strip_prefix(prefix)?.strip_suffix(".csv");
+    let checkpoint = || name.strip_prefix("chain-")?.strip_suffix(".checkpoint");
+    let number = csv("chain-").or_else(|| csv("draws-")).or_else(checkpoint);
     number.is_some_and(|n| !n.is_empty() && n.bytes().all(|b| b.is_ascii_digit()))
 }
 
@@ -181,9 +184,16 @@ mod tests {
     fn an_earlier_run_is_cleared_away_and_nothing_else() {
         let base = base("earlier");
         let dir = RunDir::create(&base).unwrap();
-        for name in
-            [MARK, "chain-1.csv", "chain-12.csv", "best.obj", ".report.html.partial", "notes.txt", "chain-x.csv"]
-        {
+        for name in [
+            MARK,
+            "chain-1.csv",
+            "chain-12.csv",
+            "draws-2.csv",
+            "best.obj",
+            ".report.html.partial",
+            "notes.txt",
+            "chain-x.csv",
+        ] {
             std::fs::write(dir.file(name), b"old").unwrap();
         }
         RunDir::create(&base).unwrap();

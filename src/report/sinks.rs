@@ -36,7 +36,7 @@ impl Memory {
 
 impl Sink for Memory {
     fn columns(&mut self, columns: &[Column]) -> io::Result<()> {
-        self.lock().columns = columns.to_vec();
+        self.lock().widen(columns.to_vec());
         Ok(())
     }
 
@@ -89,7 +89,16 @@ mod tests {
             let x = draw as f64;
             let (log_prior, log_likelihood, values) = (0.0, -x, vec![x, 2.0 * x]);
             memory
-                .draw(&DrawRow { chain: 0, draw, step: draw, log_joint: -x, log_prior, log_likelihood, values })
+                .draw(&DrawRow {
+                    chain: 0,
+                    draw,
+                    step: draw,
+                    log_joint: -x,
+                    log_prior,
+                    log_likelihood,
+                    values,
+                    ..DrawRow::default()
+                })
                 .unwrap();
             let kept = memory.lock();
             assert!(kept.rows.len() <= 100);
@@ -110,6 +119,7 @@ mod tests {
             log_prior: -1.0,
             log_likelihood: 0.0,
             values: vec![3.0],
+            ..DrawRow::default()
         };
         tee.columns(&[Column::scalar("x")]).unwrap();
         tee.draw(&row).unwrap();

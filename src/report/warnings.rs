@@ -15,7 +15,7 @@ const STUCK: usize = 50;
 /// Sentences for the user, the gravest first; none if all is well. `chains` is the number of chains that were run.
 pub fn warnings(quantities: &[Quantity], modes: &[Mode], kernels: &[KernelStats], chains: usize) -> Vec<String> {
     let mut out = Vec::new();
-    if let Some(q) = quantities.iter().find(|q| is_stuck(q)) {
+    if let Some(q) = quantities.iter().find(|q| q.is_stuck() && q.chains.iter().all(|c| c.len() >= STUCK)) {
         out.push(format!(
             "the chains disagree: {} never moved in any chain, and the chains are at different values; give it a kernel \
              that reaches it, or smaller steps",
@@ -47,8 +47,8 @@ pub fn warnings(quantities: &[Quantity], modes: &[Mode], kernels: &[KernelStats]
             ));
         } else if k.divergent > 0 {
             out.push(format!(
-                "{}: {} of {} trajectories diverged: there are places too narrow for its steps, which it may never see; write \
-                 the program with choices of one scale (normal(0, 1) times a scale), or add `drift` to the mix",
+                "{}: {} of {} trajectories were divergent, so some of the posterior may not have been explored; a \
+                 non-centred form (normal(0, 1) times a scale) is the usual remedy, or add `drift` to the mix",
                 k.name, k.divergent, k.proposals
             ));
         } else if k.accepted == 0 {
@@ -62,13 +62,6 @@ pub fn warnings(quantities: &[Quantity], modes: &[Mode], kernels: &[KernelStats]
 fn worst(quantities: &[Quantity], f: impl Fn(&Quantity) -> f64) -> Option<(f64, &str)> {
     let known = quantities.iter().map(|q| (f(q), &*q.name)).filter(|(x, _)| !x.is_nan());
     known.max_by(|a, b| a.0.total_cmp(&b.0))
-}
-
-/// Whether each chain stays where it is, and not all at one place. R-hat has no value then.
-fn is_stuck(q: &Quantity) -> bool {
-    let same = |xs: &[f64]| xs.windows(2).all(|w| w[0].to_bits() == w[1].to_bits());
-    let firsts: Vec<f64> = q.chains.iter().filter_map(|c| c.first().copied()).collect();
-    q.chains.iter().all(|c| c.len() >= STUCK && same(c)) && !same(&firsts)
 }
 
 /// Whether no chain is long enough to be split and compared.

@@ -1,7 +1,8 @@
 //! Files that no reader ever sees half of: written under another name, then renamed.
 
+use std::fs::File;
 use std::io::{self, Write};
-use std::path::Path;
+use std::path::{Path, PathBuf};
 
 /// The ending of files that are being written.
 const PARTIAL: &str = ".partial";
@@ -11,22 +12,47 @@ const PARTIAL: &str = ".partial";
 /// # Errors
 /// As the file system has it.
 pub fn write_whole(folder: &Path, name: &str, bytes: &[u8]) -> io::Result<()> {
+    let partial = begin(folder, name, |f| f.write_all(bytes))?;
+    partial.end().inspect_err(|_| {
+        // The error that is told is the first one.
+        let _ = std::fs::remove_file(&partial.0);
+    })
+}
+
+/// A file under its other name.
+pub(super) struct Partial(PathBuf, PathBuf);
+
+/// Writes a file of a folder under another name: it is at its place when it is [ended](Partial::end).
+///
+/// # Errors
+/// If it cannot be written; nothing is left of it then.
+pub(super) fn begin(folder: &Path, name: &str, write: impl FnOnce(&mut File) -> io::Result<()>) -> io::Result<Partial> {
     let (path, partial) = (folder.join(name), folder.join(format!(".{name}{PARTIAL}")));
-    let mut written = std::fs::File::create(&partial).and_then(|mut f| {
-        f.write_all(bytes)?;
+    let written = File::create(&partial).and_then(|mut f| {
+        write(&mut f)?;
         // The new name must not reach the disk before what it is of.
         f.sync_data()
     });
-    if let (Ok(()), Ok(older)) = (&written, std::fs::metadata(&path)) {
-        written = std::fs::set_permissions(&partial, older.permissions());
+    match written {
+        Ok(()) => Ok(Partial(partial, path)),
+        Err(e) => {
+            let _ = std::fs::remove_file(&partial);
+            Err(e)
+        }
     }
-    if written.is_ok() {
-        written = std::fs::rename(&partial, &path);
+}
+
+impl Partial {
+    /// Puts it at its place, with the permissions of an older file there.
+    ///
+    /// # Errors
+    /// If the system cannot.
+    pub fn end(&self) -> io::Result<()> {
+        if let Ok(older) = std::fs::metadata(&self.1) {
+            std::fs::set_permissions(&self.0, older.permissions())?;
+        }
+        std::fs::rename(&self.0, &self.1)
     }
-    written.inspect_err(|_| {
-        // The error that is told is the first one.
-        let _ = std::fs::remove_file(&partial);
-    })
 }
 
 /// Writes a file; an older one of the path is kept if that fails.

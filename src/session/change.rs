@@ -1,6 +1,6 @@
 //! Changes of the state by hand: `:flip`, `:set`, `:draw`.
 
-use super::look::{ROWS, more};
+use super::look::{ROWS, addressed, more};
 use super::{Reply, Session, Trouble, shown};
 use crate::infer::{At, accepts};
 use crate::report::number;
@@ -86,16 +86,11 @@ impl Session {
         if value.is_empty() {
             return Err(Trouble::plain("`:set` needs an address and a value").hint(":set @x 1.5"));
         }
-        if !name.starts_with('@') {
-            return match self.is_param(name) {
-                true => self.set_param(name, value),
-                false => {
-                    Err(Trouble::plain(format!("there is no param `{name}`")).hint("choices have addresses: @name"))
-                }
-            };
+        if self.is_param(name) {
+            return self.set_param(name, value);
         }
         let value = self.value_of(value)?;
-        let address = name.parse().map_err(|e| Trouble::plain(format!("{e}")))?;
+        let address = addressed(name).parse().map_err(|e| Trouble::plain(format!("{e}")))?;
         let before = Scores::of(&self.trace);
         let past = self.remember(&format!(":set {text}"));
         let given = [(address, Given::Value(value))];

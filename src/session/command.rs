@@ -22,9 +22,9 @@ const fn command(name: &'static str, takes: &'static str, doc: &'static str) -> 
 /// All commands, in the order of `:help`.
 pub const COMMANDS: &[Command] = &[
     command("trace", "[SEL]", "The choices with their values and log densities, or those of a selection"),
-    command("why", "@a", "What a choice was made from, and what depends on it"),
+    command("why", "NAME", "What a choice was made from, and what depends on it"),
     command("flip", "SEL", "Propose other values from the prior, and say what that does and whether it is accepted"),
-    command("set", "@a VALUE", "Give a choice, an observation (`@y`) or a param (`n`) another value"),
+    command("set", "NAME VALUE", "Give a param, a choice or an observation another value"),
     command("draw", "", "Draw everything anew from the prior"),
     command("undo", "", "Go back to before the last change"),
     command(
@@ -43,9 +43,20 @@ pub const COMMANDS: &[Command] = &[
     command("save", "NAME", "Write the program to NAME.pcad and the trace to NAME.trace.json"),
     command("load", "NAME", "Load a program, and its trace if there is one"),
     command("doc", "[NAME]", "Explain a built-in or command"),
-    command("help", "", "This list"),
-    command("quit", "", "Leave (also Ctrl-D)"),
+    command("clear", "", "An empty screen"),
+    command("help", "", "This list (also ? or help)"),
+    command("quit", "", "Leave (also exit, or Ctrl-D)"),
 ];
+
+/// Words that are no expression of the language and that people try, for the commands that they mean.
+pub(super) fn alias(word: &str) -> Option<&'static str> {
+    match word {
+        "help" | "?" => Some("help"),
+        "exit" | "quit" | "q" => Some("quit"),
+        "clear" => Some("clear"),
+        _ => None,
+    }
+}
 
 impl Session {
     /// Does a command, given without its colon.
@@ -79,8 +90,9 @@ impl Session {
             "save" => self.save(rest),
             "load" => self.load(rest),
             "doc" => self.doc(rest),
-            "help" => Ok(Reply::text(help())),
-            "quit" => Ok(Reply { ends: true, ..Reply::default() }),
+            "help" | "h" | "?" => Ok(Reply::text(help())),
+            "clear" => Ok(Reply { clears: true, ..Reply::default() }),
+            "quit" | "q" | "exit" => Ok(Reply { ends: true, ..Reply::default() }),
             _ => {
                 let near = nearest(name, COMMANDS.iter().map(|c| c.name));
                 let hint = near.map_or("`:help` lists the commands".to_owned(), |n| format!("did you mean `:{n}`?"));

@@ -82,6 +82,7 @@ mod tests {
                 log_prior: 0.0,
                 log_likelihood: 0.0,
                 values: vec![0.5],
+                ..DrawRow::default()
             };
             sink.draw(&row).unwrap();
         }

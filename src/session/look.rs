@@ -8,6 +8,7 @@ use crate::report::number;
 use crate::report::table::aligned;
 use crate::syntax::parse_expr;
 use crate::trace::{Address, Selector, Target, Trace};
+use std::borrow::Cow;
 
 /// Rows of a table at most.
 pub(super) const ROWS: usize = 40;
@@ -41,6 +42,7 @@ impl Session {
 
     /// The choices of a selection as it was typed, by address: at least one.
     pub(super) fn select(&mut self, text: &str) -> Result<Vec<(Address, Target)>, Trouble> {
+        let text = &addressed(text);
         let mut sources = SourceMap::new();
         let file = sources.add(INPUT, text);
         let wrong = |diagnostics, sources| Trouble::from(Error { diagnostics, sources });
@@ -88,4 +90,12 @@ pub(super) fn impossible(t: &Trace) -> String {
     let names: Vec<String> = found.iter().take(5).map(|(a, _)| a.to_string()).collect();
     let more = if found.len() > 5 { format!(" and {} more", found.len() - 5) } else { String::new() };
     format!("note: this state has probability zero, by {}{more}; `:draw` draws another one\n", names.join(", "))
+}
+
+/// A selection as it is written: a plain name or path, `x`, `t["x"]`, means the choice `@x`.
+pub(super) fn addressed(text: &str) -> Cow<'_, str> {
+    let begins = text.starts_with(|c: char| c.is_alphabetic() || c == '_');
+    let name = text.split(['[', '/']).next().unwrap_or(text);
+    let is_name = name.chars().all(|c| c.is_alphanumeric() || c == '_');
+    if begins && is_name { Cow::Owned(format!("@{text}")) } else { Cow::Borrowed(text) }
 }

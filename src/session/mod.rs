@@ -152,7 +152,12 @@ impl Session {
             None if text.is_empty() => Ok(Reply::default()),
             None if text.starts_with(['@', '$']) => self.show_trace(text),
             None if crate::syntax::is_directive(text) => self.add(text),
-            None => self.value_of(text).map(|v| Reply::text(shown::whole(&v) + "\n")),
+            None => match (self.value_of(text), command::alias(text)) {
+                (Ok(v), _) => Ok(Reply::text(shown::whole(&v) + "\n")),
+                // A name of the program comes before what else it may mean.
+                (Err(_), Some(command)) => self.command(command),
+                (Err(e), None) => Err(e),
+            },
         };
         match done {
             Err(_) if self.limits.stop.is_asked() => Err(Trouble::Stopped),

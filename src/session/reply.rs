@@ -13,6 +13,8 @@ pub struct Reply {
     pub text: String,
     /// A picture to show, after the text.
     pub picture: Option<Picture>,
+    /// Whether the screen is to be empty first.
+    pub clears: bool,
     /// Whether the user wants to leave.
     pub ends: bool,
 }

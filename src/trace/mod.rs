@@ -453,6 +453,13 @@ impl Trace {
         found
     }
 
+    /// Which observations observe what their distributions cannot give, by address, and why.
+    pub(crate) fn outside_support(&self) -> Vec<(Address, String)> {
+        let zero = self.scored().into_iter().filter(|(_, s)| *s == f64::NEG_INFINITY);
+        let why = |(n, _)| Some((self.graph.address(&self.code, n), self.graph.outside_support(&self.code, n)?));
+        zero.filter_map(why).collect()
+    }
+
     fn span(&self, n: u32) -> crate::syntax::span::Span {
         let frame = &self.graph.frames[self.graph.nodes[n as usize].frame as usize];
         self.code.blocks[frame.block as usize].spans[(n - frame.base) as usize]

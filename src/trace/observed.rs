@@ -10,8 +10,9 @@ use super::graph::Graph;
 use super::journal::Entry;
 use super::node::*;
 use super::{Address, Draws, Trace, TraceResult, Weight};
-use crate::dist::Dist;
+use crate::dist::{Datum, Dist, Support};
 use crate::lang::code::{Code, DistSpec, Observed, Op, Operand};
+use crate::lang::density::{is_repeated, pointwise};
 use crate::lang::error::Fault;
 use crate::lang::value::Value;
 use crate::rng::Stream;
@@ -86,6 +87,58 @@ impl Trace {
     /// If a value cannot be scored; the trace is then as before.
     pub fn set_observed(&mut self, values: &[(u64, Value)]) -> TraceResult<Weight> {
         self.propose_observed(&[], &[], values, Draws::default())
+    }
+
+    /// The log density of each observed value: of each observation the hash of its address and those of its elements, one where what it
+    /// observes has none. In order of the hashes, so that the same observations are in the same order. `None` if there are more than `most`.
+    pub fn pointwise(&self, most: usize) -> Option<Vec<(u64, Vec<f64>)>> {
+        let (g, code) = (&self.graph, &*self.code);
+        let (mut all, mut count) = (Vec::new(), 0);
+        for n in self.scored_nodes() {
+            let Op::Observe { dist: spec, value, site, .. } = g.op(code, n) else { continue };
+            let (mut deps, frame) = (Deps::new(), g.nodes[n as usize].frame);
+            let observed = g.observed_value(code, n, *value, &mut deps);
+            let likelihood = matches!(spec, DistSpec::Value(o) if !matches!(g.value(code, frame, *o), Value::Dist(_)));
+            let scores = match likelihood {
+                true => vec![self.score_at(n)],
+                false => match g.make_dist(code, n, frame, spec, &mut deps) {
+                    Ok(dist) => pointwise(&dist, observed),
+                    Err(_) => vec![f64::NAN],
+                },
+            };
+            count += scores.len();
+            if count > most {
+                return None;
+            }
+            all.push((g.site_hash(code, frame, *site), scores));
+        }
+        all.sort_by_key(|(hash, _)| *hash);
+        Some(all)
+    }
+
+    /// The observed values in the order of [`Trace::pointwise`]: each by its name, the observation's address and the number of the
+    /// element, and its number; NaN of what is none.
+    pub fn points(&self, most: usize) -> Vec<(String, f64)> {
+        let Some(scores) = self.pointwise(most) else { return Vec::new() };
+        let mut observed: FxHashMap<u64, Observation> = self.observed().into_iter().map(|o| (o.hash, o)).collect();
+        let mut all = Vec::new();
+        for (hash, scores) in scores {
+            let Some(o) = observed.remove(&hash) else { continue };
+            let name = o.address.to_string();
+            let name = name.trim_start_matches('@');
+            let number = |v: Value| match v {
+                Value::Num(x) => x,
+                Value::Bool(b) => f64::from(u8::from(b)),
+                _ => f64::NAN,
+            };
+            match (o.value.len(), scores.len()) {
+                (Some(n), count) if n == count => {
+                    all.extend((0..n).map(|i| (format!("{name}[{i}]"), o.value.element(i).map_or(f64::NAN, number))))
+                }
+                (_, count) => all.extend((0..count).map(|_| (name.to_owned(), number(o.value.clone())))),
+            }
+        }
+        all
     }
 
     /// The observations by the hashes of their addresses.
@@ -174,6 +227,23 @@ impl Graph {
         }
     }
 
+    /// Why an observation has probability zero whatever its distribution's parameters, if that is so at these: what is observed is not in
+    /// its support.
+    pub(super) fn outside_support(&self, code: &Code, n: NodeId) -> Option<String> {
+        let Op::Observe { dist: spec, value, .. } = self.op(code, n) else { return None };
+        let (mut deps, frame) = (Deps::new(), self.nodes[n as usize].frame);
+        let observed = self.observed_value(code, n, *value, &mut deps);
+        if let DistSpec::Value(o) = spec
+            && !matches!(self.value(code, frame, *o), Value::Dist(_))
+        {
+            return None;
+        }
+        let dist = self.make_dist(code, n, frame, spec, &mut deps).ok()?;
+        let count = dist.elements().or_else(|| observed.len().filter(|_| is_repeated(&dist, observed)));
+        let Some(count) = count else { return outside(&dist, observed) };
+        (0..count).find_map(|i| outside(&dist.element(i), &observed.element(i)?))
+    }
+
     /// A draw of what an observation observes, or what it is that cannot be drawn.
     fn draw_observed(&self, code: &Code, n: NodeId, rng: &mut Stream) -> Result<Result<Value, String>, Failure> {
         let frame = self.nodes[n as usize].frame;
@@ -196,6 +266,15 @@ impl Graph {
     }
 }
 
+/// What a value is that a distribution cannot give.
+fn outside(dist: &Dist, observed: &Value) -> Option<String> {
+    let x = observed.to_datum()?;
+    let support = dist.support();
+    let is_truth = support == Support::Boolean && matches!(x, Datum::Num(0.0 | 1.0));
+    let apart = || format!("{observed} is observed, and the support of `{}` is {support}", dist.name());
+    (!is_truth && !support.contains(&x)).then(apart)
+}
+
 /// A draw in the form in which a value is scored: element by element where the distribution is over less than the value.
 fn sample_like(dist: &Dist, observed: &Value, rng: &mut Stream) -> Value {
     let mut one = |d: &Dist| Value::from_datum(&d.sample(rng));
@@ -203,7 +282,7 @@ fn sample_like(dist: &Dist, observed: &Value, rng: &mut Stream) -> Value {
         return Value::from_elements((0..count).map(|i| one(&dist.element(i))).collect());
     }
     match observed {
-        Value::Array(xs) if dist.is_scalar() => Value::from_elements(xs.iter().map(|_| one(dist)).collect()),
+        Value::Array(xs) if is_repeated(dist, observed) => Value::from_elements(xs.iter().map(|_| one(dist)).collect()),
         Value::List(_) if observed.to_datum().is_some_and(|x| dist.support().fits(&x)) => one(dist),
         Value::List(xs) => Value::from_elements(xs.iter().map(|_| one(dist)).collect()),
         _ => one(dist),

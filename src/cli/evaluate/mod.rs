@@ -68,9 +68,9 @@ pub fn evaluate(a: &Evaluate) -> Result<(), Failure> {
         }
     }
     if a.json {
-        println!("{}", e.summary());
+        print_line!("{}", e.summary());
     } else if !a.quiet {
-        print!("{}", markdown(&e.rows()));
+        print_text!("{}", markdown(&e.rows()));
     }
     match failed.len() {
         _ if interrupted => Err(Failure::Interrupted),
@@ -254,7 +254,7 @@ impl<'a> Evaluation<'a> {
     /// Progress, for people.
     fn say(&self, text: &str) {
         if !self.a.quiet {
-            eprintln!("{text}");
+            error_line!("{text}");
         }
     }
 }

@@ -114,24 +114,24 @@ impl Front {
         let mut lines = Lines::new(Rc::clone(&self.session), has_colors()).map_err(wrong)?;
         let shown = Rc::clone(&self.shown);
         self.session.borrow_mut().set_watch(move |s| {
-            eprint!("\r\x1b[K{}", progress(s));
+            error_text!("\r\x1b[K{}", progress(s));
             shown.set(true);
         });
-        println!("pcadlang {}: :help lists the commands, Tab completes, Ctrl-D leaves", env!("CARGO_PKG_VERSION"));
+        print_line!("pcadlang {}: :help lists the commands, Tab completes, Ctrl-D leaves", env!("CARGO_PKG_VERSION"));
         let (mut told, mut warned) = (None, None);
         loop {
             let background = self.session.borrow().background();
             if let Some((number, true)) = background
                 && told != Some(number)
             {
-                println!("run {number} is done: `:stop` takes over its state");
+                print_line!("run {number} is done: `:stop` takes over its state");
                 told = Some(number);
             }
             let leaves = match lines.next(PROMPT).map_err(wrong)? {
                 Typed::Entry(text) => match self.enter(&text) {
                     Ok(leaves) => leaves,
                     Err(Failure::Interrupted) => {
-                        eprintln!("{}", Trouble::Stopped);
+                        error_line!("{}", Trouble::Stopped);
                         false
                     }
                     Err(failure) => {
@@ -145,7 +145,7 @@ impl Front {
             let background = self.session.borrow().background().map(|(number, _)| number);
             match background.filter(|_| leaves && warned != background) {
                 Some(number) => {
-                    println!("run {number} would be lost: `:stop` takes over its state; once more leaves");
+                    print_line!("run {number} would be lost: `:stop` takes over its state; once more leaves");
                     warned = background;
                 }
                 None if leaves => return Ok(()),
@@ -163,7 +163,7 @@ impl Front {
                 Ok(false) => {}
                 Err(Failure::Plain(message, hint)) if transcript => {
                     print(&Trouble::Plain(message, hint).to_string());
-                    println!();
+                    print_line!("");
                 }
                 Err(Failure::Program(e)) if transcript => print(&e.to_string()),
                 Err(failure) => return Err(failure),
@@ -178,9 +178,12 @@ impl Front {
         self.interrupts.pressed.store(0, Ordering::SeqCst);
         let done = self.session.borrow_mut().enter(text);
         if self.shown.take() {
-            eprint!("\r\x1b[K");
+            error_text!("\r\x1b[K");
         }
         let reply = done?;
+        if reply.clears && std::io::stdout().is_terminal() {
+            print("\x1b[2J\x1b[H");
+        }
         print(&reply.text);
         if let Some(picture) = &reply.picture {
             print(&pictures::shown(picture, self.graphics)?);
@@ -199,7 +202,7 @@ fn next_entry(
         let line = line.map_err(|e| plain(format!("the input cannot be read: {e}")))?;
         if transcript {
             let prompt = if entry.is_none() { PROMPT } else { CONTINUED };
-            println!("{}", format!("{prompt}{line}").trim_end());
+            print_line!("{}", format!("{prompt}{line}").trim_end());
         }
         let text = entry.map_or_else(|| line.clone(), |e| format!("{e}\n{line}"));
         if is_whole(&text) {
@@ -212,7 +215,7 @@ fn next_entry(
 
 /// Prints at once, also without a line end.
 fn print(text: &str) {
-    print!("{text}");
+    print_text!("{text}");
     let _ = std::io::stdout().flush();
 }
 

@@ -248,23 +248,23 @@ impl<'a> Sitting<'a> {
         }
         let rows = self.rows();
         let presets = self.presets(&rows);
-        println!("the front, error: {}", self.error_name());
+        print_line!("the front, error: {}", self.error_name());
         let mut front: Vec<&Row> = rows.iter().filter(|r| r.front).collect();
         front.sort_by(|a, b| a.seconds.total_cmp(&b.seconds));
         for r in front {
-            println!("{:>9}  {:.4} ({:.4} to {:.4})  {}", seconds(r.seconds), r.error, r.low, r.high, r.setting);
+            print_line!("{:>9}  {:.4} ({:.4} to {:.4})  {}", seconds(r.seconds), r.error, r.low, r.high, r.setting);
         }
         for q in Quality::ALL {
             if let Some(c) = presets.of_quality(q) {
-                println!("{:>9}: {}", q.name(), c.preset.setting.name());
+                print_line!("{:>9}: {}", q.name(), c.preset.setting.name());
             }
         }
-        println!("{}", self.a.out.display());
+        print_line!("{}", self.a.out.display());
     }
 
     fn say(&self, text: &str) {
         if !self.a.quiet {
-            eprintln!("{text}");
+            error_line!("{text}");
         }
     }
 }

@@ -96,6 +96,7 @@ mod tests {
             log_prior: 0.0,
             log_likelihood: 0.0,
             values: vec![x, x * x, -x],
+            ..DrawRow::default()
         };
         let mut chains = [Running::default(), Running::default()];
         for c in &mut chains {

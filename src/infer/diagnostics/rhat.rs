@@ -21,8 +21,12 @@ pub(super) fn rank_normalised(chains: &Chains) -> f64 {
     if folded > bulk { folded } else { bulk }
 }
 
-/// √(marginal variance / within-chain variance) (Gelman & Rubin 1992); NaN of constant chains.
+/// √(marginal variance / within-chain variance) (Gelman & Rubin 1992); NaN of chains that are all constant, whose variances are
+/// rounding errors.
 fn plain(chains: &Chains) -> f64 {
+    if chains.iter().all(|c| c.windows(2).all(|w| w[0] == w[1])) {
+        return f64::NAN;
+    }
     let n = chains.draws() as f64;
     let within = mean(&chains.iter().map(variance).collect::<Vec<_>>());
     let between = n * variance(&chains.iter().map(mean).collect::<Vec<_>>());

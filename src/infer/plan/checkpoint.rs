@@ -34,6 +34,7 @@ pub struct Checkpoint {
     step: u64,
     warmup_steps: u64,
     draws: u64,
+    counted: [u64; 3],
     seconds: f64,
     finished: bool,
     power: f64,
@@ -46,6 +47,7 @@ pub struct Checkpoint {
     kernels: Vec<SavedKernel>,
     sites: Vec<(u64, SiteStats)>,
     columns: Vec<Column>,
+    observed: Option<Vec<(u64, usize)>>,
     frozen: Selector,
     watch: Vec<u8>,
 }
@@ -85,6 +87,7 @@ impl Checkpoint {
             step: r.step,
             warmup_steps: r.warmup_steps,
             draws: r.draws,
+            counted: r.counted,
             seconds: r.started.elapsed().as_secs_f64(),
             finished: r.finished,
             power: r.power,
@@ -96,6 +99,7 @@ impl Checkpoint {
             kernels: r.instances.iter().map(kernel).collect(),
             sites: r.sites.list(),
             columns: r.recorder.columns().to_vec(),
+            observed: r.recorder.observed().clone(),
             frozen: r.frozen.clone(),
             watch: r.options.watch.as_ref().map(|w| w.save(r.chain)).unwrap_or_default(),
         })
@@ -181,7 +185,9 @@ impl<'a> Runner<'a> {
         runner.instances = c.kernels.into_iter().map(saved).collect();
         runner.sites.load(c.sites);
         runner.recorder.set_columns(c.columns);
+        runner.recorder.set_observed(c.observed);
         runner.frozen = c.frozen;
+        runner.counted = c.counted;
         (runner.step, runner.warmup_steps, runner.draws) = (c.step, c.warmup_steps, c.draws);
         (runner.power, runner.best, runner.finished) = (c.power, c.best, c.finished);
         Ok(runner)

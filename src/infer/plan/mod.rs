@@ -46,6 +46,8 @@ pub struct RunOptions {
     pub banks: Option<Arc<dyn Banks>>,
     /// Whether to count what single-site kernels do by address; it costs a few percent of a fast step.
     pub sites: bool,
+    /// Whether to record the log density of each observed value with every draw, as the column `log_lik`, where there are at most 1000.
+    pub pointwise: bool,
 }
 
 impl Default for RunOptions {
@@ -60,6 +62,7 @@ impl Default for RunOptions {
             watch: None,
             banks: None,
             sites: false,
+            pointwise: false,
         }
     }
 }

@@ -75,6 +75,8 @@ pub(super) struct Runner<'a> {
     pub population: Population,
     pub best: Option<(f64, Vec<(u64, Constraint)>)>,
     pub draws: u64,
+    /// Proposals, those accepted and divergences up to the last draw.
+    pub counted: [u64; 3],
     /// The statements being run, the outermost first.
     pub path: Vec<Place>,
     /// Where a checkpoint says to go on, the outermost first; empty once the chain is there.
@@ -119,6 +121,7 @@ impl<'a> Runner<'a> {
             population,
             best: None,
             draws: 0,
+            counted: [0; 3],
             path: Vec::new(),
             way: VecDeque::new(),
             finished: false,
@@ -398,12 +401,20 @@ impl<'a> Runner<'a> {
     /// Records a draw.
     pub fn record(&mut self, exprs: Option<&[Expr]>) -> Result<(), ChainError> {
         let draws = self.predictive();
-        let values = self.recorder.values(self.code, &mut self.trace, exprs, draws)?;
-        if self.draws == 0 {
-            self.recorder.fix_columns(&values);
+        let mut values = self.recorder.values(self.code, &mut self.trace, exprs, draws)?;
+        if self.options.pointwise {
+            self.recorder.add_pointwise(&self.trace, &mut values);
+        }
+        let (values, more) = self.recorder.row(&values);
+        if more || self.draws == 0 {
             self.sink.columns(self.recorder.columns()).map_err(ChainError::Sink)?;
         }
         let log_joint = self.trace.log_joint();
+        let sum = |f: fn(&KernelStats) -> u64| self.instances.iter().map(|i| f(&i.stats)).sum::<u64>();
+        let now = [sum(|s| s.proposals), sum(|s| s.accepted), sum(|s| s.divergent)];
+        let since = |i: usize| now[i].saturating_sub(self.counted[i]);
+        let [proposals, accepted, divergent] = [since(0), since(1), since(2)];
+        self.counted = now;
         let row = DrawRow {
             chain: self.chain,
             draw: self.draws,
@@ -411,7 +422,9 @@ impl<'a> Runner<'a> {
             log_joint,
             log_prior: self.trace.log_prior(),
             log_likelihood: self.trace.log_likelihood(),
-            values: self.recorder.flatten(&values),
+            acceptance: accepted as f64 / proposals as f64,
+            divergent,
+            values,
         };
         self.sink.draw(&row).map_err(ChainError::Sink)?;
         if let Some(watch) = &self.options.watch {

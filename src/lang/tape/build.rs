@@ -338,10 +338,12 @@ impl Builder {
         };
         let fixed = params.iter().all(Form::is_fixed);
         let own_columns = params.iter().all(|p| p.len().is_none_or(|len| len == n && matches!(dist, Dist::Product(_))));
-        let is_truth = |f: &Form| matches!(f, Form::Fixed(v) if is_bools(v));
-        // A truth value is no number to any other family, nor a number a truth value.
-        let flips = matches!(one_of(dist), Dist::Flip(_));
-        if !fits || !(fixed || own_columns) || flips != is_truth(x) {
+        // A truth value is no number to any other family, nor a number a truth value, but for 1 and 0.
+        let kind = match one_of(dist) {
+            Dist::Flip(_) => matches!(x, Form::Fixed(v) if is_bools(v) || is_zeros_and_ones(v)),
+            _ => !matches!(x, Form::Fixed(v) if is_bools(v)),
+        };
+        if !fits || !(fixed || own_columns) || !kind {
             return None;
         }
         let columns: SmallVec<[Column; 3]> = match fixed {
@@ -365,6 +367,16 @@ fn is_bools(v: &Value) -> bool {
     match v {
         Value::Bool(_) => true,
         Value::List(xs) => !xs.is_empty() && xs.iter().all(|x| matches!(x, Value::Bool(_))),
+        _ => false,
+    }
+}
+
+/// Whether a value is 1 or 0, or an array of them.
+fn is_zeros_and_ones(v: &Value) -> bool {
+    let truth = |x: &f64| *x == 0.0 || *x == 1.0;
+    match v {
+        Value::Num(x) => truth(x),
+        Value::Array(xs) => xs.iter().all(truth),
         _ => false,
     }
 }

@@ -2,7 +2,7 @@
 
 use super::DRAW_COLUMNS;
 use super::names::columns;
-use crate::infer::draws::DrawRow;
+use crate::infer::draws::{Column, DrawRow, Layout, merged, width};
 use crate::report::ChainDraws;
 use thiserror::Error;
 
@@ -10,7 +10,7 @@ use thiserror::Error;
 #[derive(Clone, Debug, PartialEq, Eq, Error)]
 pub enum CsvError {
     /// The line of names does not start with the columns about the draw.
-    #[error("line {line}: not a file of draws by pcadlang: its columns do not start with lp__, log_prior__, …")]
+    #[error("line {line}: not a file of draws by pcadlang: its columns do not start with lp__, accept_stat__, …")]
     Columns {
         /// Where.
         line: usize,
@@ -43,7 +43,7 @@ pub enum CsvError {
 pub fn read(text: &str) -> Result<ChainDraws, CsvError> {
     let mut chain = ChainDraws::default();
     let mut id = 0;
-    let mut width = None;
+    let mut layout: Option<(usize, Vec<Column>)> = None;
     let finished = text.split_inclusive('\n').filter_map(|l| l.strip_suffix('\n'));
     for (line, text) in finished.enumerate().map(|(i, l)| (i + 1, l.trim_end_matches('\r'))) {
         if let Some(comment) = text.strip_prefix('#') {
@@ -54,17 +54,28 @@ pub fn read(text: &str) -> Result<ChainDraws, CsvError> {
                 }
                 chain.comments.push((key.to_owned(), value.to_owned()));
             }
-        } else if let Some(expected) = width {
-            let row = numbers(text, line, expected)?;
-            chain.rows.push(DrawRow { chain: id, draw: chain.rows.len() as u64, ..row });
+        } else if let Some(now) = named(text) {
+            // Columns that come later are in no draw before them.
+            let all = if chain.columns.is_empty() { now.clone() } else { merged(&chain.columns, &now) };
+            chain.widen(all);
+            layout = Some((width(&now), now));
         } else {
-            let names: Vec<&str> = text.split(',').collect();
-            let ours = names.strip_prefix(&DRAW_COLUMNS).ok_or(CsvError::Columns { line })?;
-            chain.columns = columns(ours);
-            width = Some(ours.len());
+            let Some((expected, now)) = &layout else { return Err(CsvError::Columns { line }) };
+            let row = numbers(text, line, *expected)?;
+            let values = match now == &chain.columns {
+                true => row.values,
+                false => Layout::new(now, &chain.columns).apply(&row.values),
+            };
+            chain.rows.push(DrawRow { chain: id, draw: chain.rows.len() as u64, values, ..row });
         }
     }
     Ok(chain)
+}
+
+/// The recorded columns of a line of names; `None` of any other line.
+pub(crate) fn named(text: &str) -> Option<Vec<Column>> {
+    let names: Vec<&str> = text.split(',').collect();
+    names.strip_prefix(&DRAW_COLUMNS).map(columns)
 }
 
 /// A draw of so many recorded numbers; its chain and number are left 0.
@@ -72,15 +83,21 @@ pub(super) fn numbers(text: &str, line: usize, expected: usize) -> Result<DrawRo
     let parse = |s: &str| s.parse::<f64>().map_err(|_| CsvError::Number { line, text: s.chars().take(40).collect() });
     let all = text.split(',').map(parse).collect::<Result<Vec<f64>, _>>()?;
     match &all[..] {
-        [log_joint, log_prior, log_likelihood, step, values @ ..] if values.len() == expected => Ok(DrawRow {
-            chain: 0,
-            draw: 0,
-            step: *step as u64,
-            log_joint: *log_joint,
-            log_prior: *log_prior,
-            log_likelihood: *log_likelihood,
-            values: values.to_vec(),
-        }),
+        [log_joint, acceptance, divergent, log_prior, log_likelihood, step, values @ ..]
+            if values.len() == expected =>
+        {
+            Ok(DrawRow {
+                chain: 0,
+                draw: 0,
+                step: *step as u64,
+                log_joint: *log_joint,
+                log_prior: *log_prior,
+                log_likelihood: *log_likelihood,
+                acceptance: *acceptance,
+                divergent: *divergent as u64,
+                values: values.to_vec(),
+            })
+        }
         _ => Err(CsvError::Width { line, found: all.len(), expected: expected + DRAW_COLUMNS.len() }),
     }
 }
@@ -89,11 +106,11 @@ pub(super) fn numbers(text: &str, line: usize, expected: usize) -> Result<DrawRo
 mod tests {
     use super::*;
 
-    const HEAD: &str = "# id = 3\nlp__,log_prior__,log_likelihood__,step__,x,v.1,v.2\n";
+    const HEAD: &str = "# id = 3\nlp__,accept_stat__,divergent__,log_prior__,log_likelihood__,step__,x,v.1,v.2\n";
 
     #[test]
     fn an_unfinished_line_is_left_out() {
-        let whole = format!("{HEAD}-1,-2,1,5,0.5,1,2\n");
+        let whole = format!("{HEAD}-1,0.5,0,-2,1,5,0.5,1,2\n");
         for cut in 0..whole.len() {
             let chain = read(&whole[..cut]).unwrap();
             assert!(chain.rows.is_empty());
@@ -106,8 +123,8 @@ mod tests {
     fn what_is_wrong_is_said_with_its_line() {
         assert_eq!(read("a,b\n1,2\n"), Err(CsvError::Columns { line: 1 }));
         let short = format!("{HEAD}1,2,3\n");
-        assert_eq!(read(&short), Err(CsvError::Width { line: 3, found: 3, expected: 7 }));
-        let word = format!("{HEAD}1,2,3,4,x,6,7\n");
+        assert_eq!(read(&short), Err(CsvError::Width { line: 3, found: 3, expected: 9 }));
+        let word = format!("{HEAD}1,2,3,4,5,6,x,6,7\n");
         assert_eq!(read(&word), Err(CsvError::Number { line: 3, text: "x".into() }));
         assert_eq!(read("").unwrap(), ChainDraws::default());
     }

@@ -1,8 +1,8 @@
 //! Reading draws back one at a time, however many there are.
 
-use super::DRAW_COLUMNS;
-use super::read::{CsvError, numbers};
-use crate::infer::draws::{Column, DrawRow, width};
+use super::names::column_names;
+use super::read::{CsvError, named, numbers};
+use crate::infer::draws::{Column, DrawRow, Layout, merged, width};
 use std::io::{self, BufRead, Read};
 
 /// Why the next draw cannot be had.
@@ -19,20 +19,23 @@ pub enum StreamError {
 /// Reads the draws of the first so many bytes of a file.
 pub struct DrawReader<R> {
     from: R,
-    /// Numbers that are recorded with a draw.
-    width: usize,
+    /// The columns that draws are wanted in, by their names in the file.
+    columns: Vec<Column>,
     position: u64,
     end: u64,
     line: usize,
     text: String,
-    /// Whether the line of names has come.
-    named: bool,
+    /// What the lines after the last line of names have: so many numbers, and where they belong.
+    layout: Option<(usize, Layout)>,
 }
 
 impl<R: BufRead> DrawReader<R> {
-    /// A reader of what [`super::CsvSink`] wrote with these columns; nothing at or after byte `end` is looked at.
+    /// A reader of what [`super::CsvSink`] wrote with these columns, or with fewer before more came; nothing at or after byte `end`
+    /// is looked at.
     pub fn new(from: R, columns: &[Column], end: u64) -> Self {
-        DrawReader { from, width: width(columns), position: 0, end, line: 0, text: String::new(), named: false }
+        let names = column_names(columns);
+        let columns = super::names::columns(&names.iter().map(String::as_str).collect::<Vec<_>>());
+        DrawReader { from, columns, position: 0, end, line: 0, text: String::new(), layout: None }
     }
 
     /// The bytes of all finished lines so far.
@@ -57,18 +60,23 @@ impl<R: BufRead> DrawReader<R> {
             if text.starts_with('#') {
                 continue;
             }
-            if self.named {
-                return Ok(Some(numbers(text, self.line, self.width)?));
+            if let Some(now) = named(text) {
+                let wider = merged(&self.columns, &now);
+                if wider != self.columns {
+                    let (found, expected) = (width(&wider), width(&self.columns));
+                    return Err(CsvError::Width { line: self.line, found, expected }.into());
+                }
+                self.layout = Some((width(&now), Layout::new(&now, &self.columns)));
+                continue;
             }
-            let found = text.split(',').count();
-            if !text.split(',').take(DRAW_COLUMNS.len()).eq(DRAW_COLUMNS) {
+            let Some((expected, layout)) = &self.layout else {
                 return Err(CsvError::Columns { line: self.line }.into());
-            }
-            let expected = self.width + DRAW_COLUMNS.len();
-            if found != expected {
-                return Err(CsvError::Width { line: self.line, found, expected }.into());
-            }
-            self.named = true;
+            };
+            let row = numbers(text, self.line, *expected)?;
+            return Ok(Some(match layout.is_same(*expected) {
+                true => row,
+                false => DrawRow { values: layout.apply(&row.values), ..row },
+            }));
         }
     }
 }
@@ -77,8 +85,7 @@ impl<R: BufRead> DrawReader<R> {
 mod tests {
     use super::*;
 
-    const TEXT: &str =
-        "# id = 1\nlp__,log_prior__,log_likelihood__,step__,x,v.1,v.2\n-1,-2,1,5,0.5,1,2\n-3,-2,1,9,inf,1,2\n";
+    const TEXT: &str = "# id = 1\nlp__,accept_stat__,divergent__,log_prior__,log_likelihood__,step__,x,v.1,v.2\n-1,1,0,-2,1,5,0.5,1,2\n-3,1,0,-2,1,9,inf,1,2\n";
 
     fn rows(text: &str, end: usize) -> Result<(usize, u64), StreamError> {
         let mut reader = DrawReader::new(text.as_bytes(), &[Column::scalar("x"), Column::vector("v", 2)], end as u64);
@@ -100,10 +107,26 @@ mod tests {
     }
 
     #[test]
+    fn columns_that_come_later_are_nan_before() {
+        let names = "lp__,accept_stat__,divergent__,log_prior__,log_likelihood__,step__";
+        let text = format!("{names},v.1\n-1,1,0,-2,1,5,1\n{names},v.1,v.2,x\n-3,1,0,-2,1,9,3,4,7\n");
+        let mut reader =
+            DrawReader::new(text.as_bytes(), &[Column::vector("v", 2), Column::scalar("x")], text.len() as u64);
+        let mut next = || reader.next_row().unwrap().unwrap().values;
+        let first = next();
+        assert!(first[0] == 1.0 && first[1..].iter().all(|x| x.is_nan()) && first.len() == 3);
+        assert_eq!(next(), [3.0, 4.0, 7.0]);
+        let whole = super::super::read(&text).unwrap();
+        assert_eq!(whole.columns, [Column::vector("v", 2), Column::scalar("x")]);
+        assert!(whole.rows[0].values[1].is_nan() && whole.rows[1].values == [3.0, 4.0, 7.0]);
+    }
+
+    #[test]
     fn what_is_wrong_is_told() {
         let error = |text: &str| rows(text, text.len()).unwrap_err().to_string();
         assert!(error("a,b\n").contains("line 1"));
-        assert!(error(&TEXT.replace(",v.2", "")).contains("6 numbers, but 7 columns"));
+        assert!(error(&TEXT.replace(",v.2", "")).contains("9 numbers, but 8 columns"));
+        assert!(error(&TEXT.replace("step__,x", "step__,y")).contains("line 2"), "a column that is not known");
         assert!(error(&TEXT.replace("inf", "x")).contains("line 4"));
     }
 }

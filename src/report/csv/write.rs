@@ -61,6 +61,19 @@ impl<W: Write> CsvSink<W> {
         Ok(CsvSink { out, comments: text, width: None, line: String::new(), written })
     }
 
+    /// A sink that begins with the line of names.
+    pub(crate) fn bare(out: W) -> Self {
+        CsvSink { out, comments: String::new(), width: None, line: String::new(), written: 0 }
+    }
+
+    /// Hands everything to the system.
+    ///
+    /// # Errors
+    /// If it cannot be written.
+    pub(crate) fn flush(&mut self) -> io::Result<()> {
+        self.out.flush()
+    }
+
     /// The bytes written so far.
     pub(crate) fn written(&self) -> u64 {
         self.written
@@ -90,7 +103,9 @@ impl<W: Write + Send> Sink for CsvSink<W> {
         }
         self.line.clear();
         // Writing to a string does not fail. `{:?}` is the shortest text that reads back to the same bits.
-        let _ = write!(self.line, "{:?},{:?},{:?},{}", row.log_joint, row.log_prior, row.log_likelihood, row.step);
+        let r = row;
+        let _ = write!(self.line, "{:?},{:?},{}", r.log_joint, r.acceptance, r.divergent);
+        let _ = write!(self.line, ",{:?},{:?},{}", r.log_prior, r.log_likelihood, r.step);
         for x in &row.values {
             let _ = write!(self.line, ",{x:?}");
         }
@@ -133,7 +148,9 @@ mod tests {
 
     fn row(draw: u64, values: Vec<f64>) -> DrawRow {
         let x = draw as f64 / 3.0;
-        DrawRow { chain: 2, draw, step: 10 * draw, log_joint: -x, log_prior: 0.5 - x, log_likelihood: -0.5, values }
+        let (log_joint, log_prior, log_likelihood) = (-x, 0.5 - x, -0.5);
+        let (acceptance, divergent) = (0.25, draw % 2);
+        DrawRow { chain: 2, draw, step: 10 * draw, log_joint, log_prior, log_likelihood, acceptance, divergent, values }
     }
 
     const ODD: [f64; 8] =
@@ -163,6 +180,7 @@ mod tests {
             assert_eq!(bits(back), bits(&wrote));
             assert_eq!((back.log_joint, back.log_prior), (wrote.log_joint, wrote.log_prior));
             assert_eq!((back.chain, back.draw, back.step), (2, wrote.draw, wrote.step));
+            assert_eq!((back.acceptance, back.divergent), (wrote.acceptance, wrote.divergent));
         }
         let said = |key: &str| chain.comments.iter().find(|(k, _)| k == key).map(|(_, v)| v.as_str());
         assert_eq!((said("seed"), said("program"), said("steps")), (Some("7"), Some("a b"), Some("40")));

@@ -28,6 +28,8 @@ pub struct Page<'a> {
     pub kernels: &'a [KernelStats],
     /// What a reader should know first.
     pub warnings: &'a [String],
+    /// What is approximate.
+    pub approximate: &'a [String],
     /// The mesh of the best state.
     pub mesh: Option<MeshData<'a>>,
     /// The program's text.
@@ -66,6 +68,13 @@ pub fn page(p: &Page) -> String {
     modes(&mut s, p.modes, p.quantities);
     kernels(&mut s, p.kernels);
     draws(&mut s, p.quantities);
+    if !p.approximate.is_empty() {
+        s.push_str("<h2>What is approximate</h2>\n<ul>\n");
+        p.approximate.iter().for_each(|a| {
+            let _ = writeln!(s, "<li>{}", escaped(a));
+        });
+        s.push_str("</ul>\n");
+    }
     s.push_str("<h2>Settings</h2>\n<table class=\"settings\">\n");
     for (k, v) in &p.settings {
         let _ = writeln!(s, "<tr><td>{}<td>{}</tr>", escaped(k), escaped(v));
@@ -190,9 +199,10 @@ mod tests {
             quantities: &[q],
             kernels: &[kernel],
             warnings: &[text.into()],
+            approximate: &[text.into()],
         });
         assert!(!page.contains("alert(1)</") && !page.contains("& ") && !page.contains("alert(1)<"), "escaped");
-        assert_eq!(page.matches("&lt;script&gt;alert(1)&lt;/script&gt; &amp; &quot;s&quot;").count(), 11);
+        assert_eq!(page.matches("&lt;script&gt;alert(1)&lt;/script&gt; &amp; &quot;s&quot;").count(), 12);
         assert!(page.contains("data:image/png;base64,AQID"));
         assert!(page.contains("{\"positions\":[0,0,2,0,0,2,0,0,2],\"triangles\":[0,1,2]}"));
         assert!(page.contains("<td class=\"bad\">") && page.contains("<td>0<td>-<td>0<td>0.00 s"));

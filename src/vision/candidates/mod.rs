@@ -1,6 +1,8 @@
 //! Regions of a photograph that may be an object of revolution (vases, bottles, cups, lamps),
 //! without learned weights.
 //!
+//! Of clean contours without a photograph they are what the contours enclose. Of a photograph:
+//!
 //! Segments and clusters of colour are joined into regions, the most promising are cut out along
 //! edges, and what is symmetric, stands out from what is around it and lies within the picture
 //! comes first. A function of the picture alone, with the same bits on any machine. Not here: what
@@ -9,6 +11,7 @@
 mod area;
 mod clusters;
 mod cut;
+mod enclosed;
 mod felzenszwalb;
 mod merge;
 mod mirror;
@@ -22,6 +25,7 @@ mod tests;
 use crate::vision::{Mask, Photo};
 use area::Area;
 use cut::Field;
+pub use enclosed::enclosed;
 use felzenszwalb::{Edges, felzenszwalb};
 use merge::{Rule, merge};
 use picture::Picture;
@@ -89,12 +93,18 @@ pub fn candidates(photo: &Photo, options: &CandidateOptions) -> Vec<Candidate> {
     let picture = Picture::of(photo, options.size.clamp(16, 1024));
     let (width, height) = (f64::from(photo.width()), f64::from(photo.height()));
     let scale = [width / picture.width as f64, height / picture.height as f64];
-    let candidate = |(score, area): (f64, Area)| {
-        let axes = mirror::mirrors(&area).iter().map(|m| profile::axis(&picture, &area, m, scale)).collect();
+    let edges = rim::Edges { gradient: &picture.gradient, strong: picture.strong };
+    let candidate = |(score, area)| Candidate::new(score, area, &edges, scale);
+    found(&picture, options.most).into_iter().filter_map(candidate).collect()
+}
+
+impl Candidate {
+    /// Of a region of a picture with these edges, where a pixel is `scale` pixels of the photograph.
+    fn new(score: f64, area: Area, edges: &rim::Edges, scale: [f64; 2]) -> Option<Candidate> {
+        let axes = mirror::mirrors(&area).iter().map(|m| profile::axis(edges, &area, m, scale)).collect();
         let mask = Mask::new(area.width as u32, area.height as u32, area.on).ok()?;
         Some(Candidate { score, mask, axes })
-    };
-    found(&picture, options.most).into_iter().filter_map(candidate).collect()
+    }
 }
 
 /// The best regions with their scores.

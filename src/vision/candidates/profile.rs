@@ -3,8 +3,7 @@
 use super::Axis;
 use super::area::Area;
 use super::mirror::Mirror;
-use super::picture::Picture;
-use super::rim::rims;
+use super::rim::{Edges, rims};
 
 /// Places along an axis at which there are widths.
 const PLACES: usize = 24;
@@ -13,9 +12,9 @@ const LINES: usize = 4;
 /// Steps across, pixels.
 const STEP: f64 = 0.25;
 
-/// The axis of a mirror of a region of a picture, where a pixel is `scale` pixels of the photograph
-/// wide and high.
-pub fn axis(picture: &Picture, area: &Area, mirror: &Mirror, scale: [f64; 2]) -> Axis {
+/// The axis of a mirror of a region of a picture with these edges, where a pixel is `scale` pixels of
+/// the photograph wide and high.
+pub fn axis(edges: &Edges, area: &Area, mirror: &Mirror, scale: [f64; 2]) -> Axis {
     let normal = [libm::cos(mirror.angle), libm::sin(mirror.angle)];
     // Upwards in the picture; to the right where it is level.
     let up = if normal[0] > 0.0 { [normal[1], -normal[0]] } else { [-normal[1], normal[0]] };
@@ -44,8 +43,8 @@ pub fn axis(picture: &Picture, area: &Area, mirror: &Mirror, scale: [f64; 2]) ->
         let i = (t as usize).min(PLACES - 2);
         means[i] + (t - i as f64) * (means[i + 1] - means[i])
     };
-    let foot = rims(picture, length, width, |d, x| at(low + d, x));
-    let top = rims(picture, length, |d| width(length - d), |d, x| at(high - d, x));
+    let foot = rims(edges, length, width, |d, x| at(low + d, x));
+    let top = rims(edges, length, |d| width(length - d), |d, x| at(high - d, x));
     let across = libm::hypot(normal[0] * scale[0], normal[1] * scale[1]);
     let place = |along: f64| {
         let p = at(along, 0.0);

@@ -1,6 +1,7 @@
 //! A drawn vase is found, and the steps do what they say.
 
 use super::*;
+use crate::vision::ContourMap;
 use image::{Rgb, RgbImage};
 
 const WIDTH: u32 = 240;
@@ -53,6 +54,11 @@ fn iou(a: &Mask, b: &Mask) -> f64 {
 fn check_vase(lean: f64) {
     let (photo, truth) = vase(lean);
     let found = candidates(&photo, &CandidateOptions::default());
+    check_first(&found, &truth, lean);
+}
+
+/// Whether the vase comes first in a list, with its axis and its widths.
+fn check_first(found: &[Candidate], truth: &Mask, lean: f64) {
     let first = found.first().expect("nothing was found");
     let overlap = iou(&first.mask, &truth.resized(first.mask.width(), first.mask.height()));
     assert!(overlap > 0.9, "{overlap}");
@@ -269,4 +275,91 @@ fn rims_tell_tilts() {
     let (photo, _) = vase(0.0);
     let rims = &candidates(&photo, &CandidateOptions::default())[0].axes[0].rims;
     assert!(rims.iter().all(|r| (0.0..0.35).contains(r)), "{rims:?}");
+}
+
+/// Points a pixel apart along lines between places.
+fn lines(places: &[[f64; 2]], map: &mut ContourMap) {
+    for ends in places.windows(2) {
+        let d = [ends[1][0] - ends[0][0], ends[1][1] - ends[0][1]];
+        let length = libm::hypot(d[0], d[1]);
+        let steps = length.ceil() as usize;
+        for s in 0..steps {
+            let t = s as f64 / steps as f64;
+            map.x.push((ends[0][0] + t * d[0]) as f32);
+            map.y.push((ends[0][1] + t * d[1]) as f32);
+            map.tx.push((d[0] / length) as f32);
+            map.ty.push((d[1] / length) as f32);
+            map.strength.push(1.0);
+        }
+    }
+}
+
+/// The outline of the vase from its foot up, over the top and down again, and at last along the foot.
+fn outline(lean: f64) -> Vec<[f64; 2]> {
+    let (s, c) = (libm::sin(lean), libm::cos(lean));
+    let at = |t: f64, across: f64| {
+        let along = (t - 0.5) * LENGTH;
+        [MIDDLE[0] + along * s + across * c, MIDDLE[1] - along * c + across * s]
+    };
+    let t = |i: usize| i as f64 / 40.0;
+    let left = (0..=40).map(|i| at(t(i), -profile(t(i))));
+    let right = (0..=40).rev().map(|i| at(t(i), profile(t(i))));
+    left.chain(right).chain([at(0.0, -profile(0.0))]).collect()
+}
+
+#[test]
+fn clean_contours_enclose_a_vase() {
+    let options = CandidateOptions { size: 256, most: 20 };
+    for lean in [0.0, -0.3] {
+        let mut map = ContourMap::new(WIDTH, HEIGHT);
+        lines(&outline(lean), &mut map);
+        let found = enclosed(&map, &options);
+        let (_, truth) = vase(lean);
+        check_first(&found, &truth, lean);
+        assert!(found.len() == 1 && iou(&found[0].mask, &truth) > 0.96, "{}", iou(&found[0].mask, &truth));
+        // With gaps of six pixels, and smaller, as a program may ask.
+        let mut gaps = ContourMap::new(WIDTH, HEIGHT);
+        outline(lean).chunks(20).for_each(|part| lines(part, &mut gaps));
+        let closed = enclosed(&gaps, &options);
+        assert!(iou(&closed[0].mask, &truth) > 0.85 && closed[0].axes[0].symmetry > 0.9);
+        check_first(&enclosed(&map, &CandidateOptions { size: 96, most: 5 }), &truth, lean);
+        assert!(enclosed(&map, &CandidateOptions { most: 0, ..options }).is_empty());
+    }
+    // An outline that does not close, and no outline.
+    let mut open = ContourMap::new(WIDTH, HEIGHT);
+    lines(&outline(0.0)[..70], &mut open);
+    assert!(enclosed(&open, &options).is_empty());
+    assert!(enclosed(&ContourMap::new(WIDTH, HEIGHT), &options).is_empty());
+    assert!(enclosed(&ContourMap::default(), &options).is_empty());
+}
+
+/// The inner edge of a rim tells the tilt in clean contours, too.
+#[test]
+fn rims_of_clean_contours_tell_tilts() {
+    const RADIUS: f64 = 40.0;
+    let tilts: Vec<f64> = tilts().collect();
+    for tilt in [0.3, 0.6, 1.0] {
+        let (flat, rim, foot) = (RADIUS * libm::sin(tilt), 75.0, 75.0 + 80.0 * libm::cos(tilt));
+        let arc = |middle: f64, from: f64, to: f64| {
+            (0..=40).map(move |i| {
+                let angle = std::f64::consts::PI * (from + (to - from) * f64::from(i) / 40.0);
+                [120.0 + RADIUS * libm::cos(angle), middle + flat * libm::sin(angle)]
+            })
+        };
+        let mut map = ContourMap::new(WIDTH, HEIGHT);
+        lines(&arc(rim, 0.0, 2.0).collect::<Vec<_>>(), &mut map);
+        let below = [[120.0 + RADIUS, rim]].into_iter().chain(arc(foot, 0.0, 1.0)).chain([[120.0 - RADIUS, rim]]);
+        lines(&below.collect::<Vec<_>>(), &mut map);
+        let found = enclosed(&map, &CandidateOptions { size: 256, most: 20 });
+        // The axis that stands upright, which need not be the more symmetric one.
+        let upright = |a: &&Axis| (a.top[0] - a.foot[0]).abs() < 4.0;
+        let axis = found.first().and_then(|c| c.axes.iter().find(upright)).expect("no upright axis");
+        let best = (0..80).fold(0, |best, i| if axis.rims[i] > axis.rims[best] { i } else { best });
+        assert!(
+            (tilts[best] - tilt).abs() < 0.06 && axis.rims[best] > 0.5,
+            "{tilt}: {} {}",
+            tilts[best],
+            axis.rims[best]
+        );
+    }
 }

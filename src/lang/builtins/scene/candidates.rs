@@ -6,7 +6,7 @@ use crate::lang::builtins::{Row, Type, arg, opt};
 use crate::lang::error::{Fault, FaultKind};
 use crate::lang::value::Value;
 use crate::render::{Camera, Projection};
-use crate::vision::candidates::{Axis, Candidate, CandidateOptions, candidates, tilts};
+use crate::vision::candidates::{Axis, Candidate, CandidateOptions, candidates, enclosed, tilts};
 use glam::DVec3;
 use std::sync::Arc;
 
@@ -14,9 +14,10 @@ pub(super) const TABLE: &[Row] = &[native(
     "candidates",
     "Finding",
     &[
-        arg("photo", IMAGE, "The photograph; nothing is found in contours alone."),
+        arg("photo", IMAGE, "The photograph; in clean contours without one, what they enclose is found."),
         opt("most", Type::Int, "20", "How many are given at most, 1 to 64."),
-        opt("size", Type::Int, "128", "The longer side of the picture worked on, 32 to 512.").unit("pixels"),
+        opt("size", Type::Int, "128", "The longer side of the picture worked on, 32 to 512; 256 in contours alone.")
+            .unit("pixels"),
         opt("camera", CAMERA, "the run's", "The camera; without one, that of the run."),
     ],
     Type::Array,
@@ -30,20 +31,22 @@ pub(super) const TABLE: &[Row] = &[native(
             return Ok(Value::List(Arc::from([])));
         }
         let image = a.object::<ImageValue>(0, "an image")?;
-        let Some(photo) = image.as_photo() else { return Ok(Value::List(Arc::from([]))) };
+        let (width, height) = image.size();
         let most = if a.given(1) { a.int_in(1, 1, 64)? as usize } else { CandidateOptions::default().most };
-        let size = if a.given(2) { a.int_in(2, 32, 512)? as u32 } else { CandidateOptions::default().size };
+        let usual = if image.as_photo().is_some() { CandidateOptions::default().size } else { 256 };
+        let size = if a.given(2) { a.int_in(2, 32, 512)? as u32 } else { usual };
         let camera = match a.given(3) {
             true => a.object::<CameraValue>(3, "a camera")?.0,
-            false => Camera::default_for(photo.width(), photo.height()),
+            false => Camera::default_for(width, height),
         };
         let options = CandidateOptions { most, size };
-        let found = image.candidates.get(options, |o| Ok(candidates(photo, o)));
+        let found = image.candidates.get(options, |o| match image.as_photo() {
+            Some(photo) => Ok(candidates(photo, o)),
+            None => Ok(enclosed(image.map()?, o)),
+        });
         let found = found.map_err(|e: String| Fault::new(FaultKind::Other, format!("scene.candidates: {e}")))?;
-        let scale = [
-            f64::from(camera.width) / f64::from(photo.width().max(1)),
-            f64::from(camera.height) / f64::from(photo.height().max(1)),
-        ];
+        let scale =
+            [f64::from(camera.width) / f64::from(width.max(1)), f64::from(camera.height) / f64::from(height.max(1))];
         Ok(Value::List(found.iter().map(|c| value(c, &camera, scale)).collect()))
     },
 )];

@@ -1,0 +1,150 @@
+//! The chains of a run that has ended in one form, as ArviZ and CmdStan's tools want them: the same columns, and equally many draws.
+//!
+//! A chain's file grows while it runs, and under a limit of time one chain gets further than another; columns come when the structure of
+//! a scene changes. What does not fit is kept as it came in `draws-N.csv` beside `chain-N.csv`, from which the chain can go on.
+//!
+//! Invariant: whenever the process stops, either file holds all draws of the chain.
+
+use super::csv::{CsvSink, DrawReader, named};
+use super::whole::begin;
+use crate::infer::draws::{Column, DrawRow, Sink, merged};
+use std::fs::File;
+use std::io::{self, BufRead, BufReader, BufWriter, Write};
+use std::path::Path;
+
+/// The name of a chain's draws; chains are counted from 0.
+pub(super) fn draws_name(chain: u32) -> String {
+    format!("chain-{}.csv", u64::from(chain) + 1)
+}
+
+/// The name of the file that keeps all draws of a chain, where it has more than the others.
+pub(super) fn all_name(chain: u32) -> String {
+    format!("draws-{}.csv", u64::from(chain) + 1)
+}
+
+/// What a chain's file has.
+#[derive(Default)]
+struct Found {
+    comments: String,
+    columns: Vec<Column>,
+    /// Whether one line of names is all there is.
+    plain: bool,
+    draws: u64,
+}
+
+/// Brings the files of so many chains to the same columns and, if `even`, to equally many draws: as many as the chain with the fewest has,
+/// of those that have any. Returns how many each has then, if draws were left out.
+///
+/// # Errors
+/// If a file cannot be read or written.
+pub fn align(dir: &Path, chains: u32, even: bool) -> io::Result<Option<u64>> {
+    let found = (0..chains).map(|c| look(&dir.join(draws_name(c)))).collect::<io::Result<Vec<_>>>()?;
+    let counts = || found.iter().map(|f| f.draws).filter(|n| *n > 0);
+    let (fewest, most) = (counts().min().unwrap_or(0), counts().max().unwrap_or(0));
+    let keep = if even { fewest } else { most };
+    let columns = found.iter().fold(Vec::new(), |all, f| merged(&all, &f.columns));
+    for (chain, f) in (0..chains).zip(&found).filter(|(_, f)| f.draws > 0) {
+        if f.draws > keep || !f.plain || f.columns != columns {
+            rewrite(dir, chain, f, &columns, keep)?;
+        }
+    }
+    Ok((keep < most).then_some(keep))
+}
+
+/// Gives a chain's file all its draws back, if some were put aside.
+///
+/// # Errors
+/// If the system cannot.
+pub(super) fn restore(dir: &Path, chain: u32) -> io::Result<()> {
+    match std::fs::rename(dir.join(all_name(chain)), dir.join(draws_name(chain))) {
+        Err(e) if e.kind() != io::ErrorKind::NotFound => Err(e),
+        _ => Ok(()),
+    }
+}
+
+fn look(path: &Path) -> io::Result<Found> {
+    let mut found = Found { plain: true, ..Found::default() };
+    for line in BufReader::new(File::open(path)?).lines() {
+        let line = line?;
+        if line.starts_with('#') {
+            found.comments.push_str(&line);
+            found.comments.push('\n');
+        } else if let Some(columns) = named(&line) {
+            found.plain &= found.columns.is_empty();
+            found.columns = merged(&found.columns, &columns);
+        } else {
+            found.draws += 1;
+        }
+    }
+    Ok(found)
+}
+
+/// Writes a chain's file anew, with its first draws in these columns, and keeps the old one.
+fn rewrite(dir: &Path, chain: u32, found: &Found, columns: &[Column], keep: u64) -> io::Result<()> {
+    let path = dir.join(draws_name(chain));
+    let file = File::open(&path)?;
+    let end = file.metadata()?.len();
+    let mut reader = DrawReader::new(BufReader::new(file), columns, end);
+    let new = begin(dir, &draws_name(chain), |file| {
+        let mut out = BufWriter::new(file);
+        out.write_all(found.comments.as_bytes())?;
+        let mut sink = CsvSink::bare(out);
+        sink.columns(columns)?;
+        for draw in 0..keep.min(found.draws) {
+            let Some(row) = reader.next_row().map_err(io::Error::other)? else { break };
+            sink.draw(&DrawRow { chain, draw, ..row })?;
+        }
+        sink.flush()
+    })?;
+    std::fs::rename(&path, dir.join(all_name(chain)))?;
+    new.end()
+}
+
+#[cfg(test)]
+mod tests {
+    use super::super::csv::read;
+    use super::*;
+    use std::path::PathBuf;
+
+    const NAMES: &str = "lp__,accept_stat__,divergent__,log_prior__,log_likelihood__,step__";
+
+    fn folder(name: &str) -> PathBuf {
+        let dir = std::env::temp_dir().join(format!("pcadlang-aligned-{name}-{}", std::process::id()));
+        let _ = std::fs::remove_dir_all(&dir);
+        std::fs::create_dir_all(&dir).unwrap();
+        dir
+    }
+
+    #[test]
+    fn chains_come_to_one_form_and_back() {
+        let dir = folder("form");
+        let one = format!(
+            "# id = 1\n{NAMES},k,w.1\n-1,1,0,0,-1,1,1,0.1\n{NAMES},k,w.1,w.2\n-2,1,0,0,-2,2,2,0.1,0.2\n# steps = 2\n"
+        );
+        let two =
+            format!("# id = 2\n{NAMES},k,w.1,e\n-1,1,0,0,-1,1,1,0.3,7\n-1,1,0,0,-1,2,1,0.3,8\n-1,1,0,0,-1,3,1,0.4,9\n");
+        std::fs::write(dir.join("chain-1.csv"), &one).unwrap();
+        std::fs::write(dir.join("chain-2.csv"), &two).unwrap();
+        // A chain that was ended before it began.
+        std::fs::write(dir.join("chain-3.csv"), "# id = 3\n").unwrap();
+        assert_eq!(align(&dir, 3, true).unwrap(), Some(2));
+        let chain = |name: &str| read(&std::fs::read_to_string(dir.join(name)).unwrap()).unwrap();
+        let (a, b) = (chain("chain-1.csv"), chain("chain-2.csv"));
+        assert_eq!(a.columns, b.columns);
+        assert_eq!((a.rows.len(), b.rows.len()), (2, 2));
+        assert!(a.rows[0].values[..2] == [1.0, 0.1] && a.rows[0].values[2..].iter().all(|x| x.is_nan()));
+        assert!(b.rows[1].values[..2] == [1.0, 0.3] && b.rows[1].values[2].is_nan() && b.rows[1].values[3] == 8.0);
+        assert!(a.comments.contains(&("steps".into(), "2".into())));
+        // All draws are there still, and are taken up again.
+        assert_eq!(chain("draws-2.csv").rows.len(), 3);
+        assert_eq!(align(&dir, 3, true).unwrap(), None, "nothing is left to do");
+        (0..3).for_each(|c| restore(&dir, c).unwrap());
+        assert_eq!(std::fs::read_to_string(dir.join("chain-1.csv")).unwrap(), one);
+        assert_eq!(std::fs::read_to_string(dir.join("chain-2.csv")).unwrap(), two);
+        assert!(!dir.join("draws-1.csv").exists());
+        // Of a run that was interrupted nothing is left out.
+        assert_eq!(align(&dir, 3, false).unwrap(), None);
+        assert_eq!((chain("chain-1.csv").rows.len(), chain("chain-2.csv").rows.len()), (2, 3));
+        std::fs::remove_dir_all(&dir).unwrap();
+    }
+}

@@ -1,0 +1,97 @@
+//! What clean contours enclose: regions where there is no photograph to find them in.
+
+use super::area::{Area, components};
+use super::mirror::symmetry;
+use super::rim::Edges;
+use super::score::suppressed;
+use super::{Candidate, CandidateOptions, LEAST, OVERLAP};
+use crate::vision::ContourMap;
+use crate::vision::gradient::Gradient;
+
+/// How far points reach along their contour, so that gaps between them close, pixels.
+const REACH: f32 = 0.75;
+/// Gaps of up to twice so many pixels are closed: where a contour is hidden by a hair, some of it is missing.
+const GAPS: [usize; 5] = [0, 1, 3, 6, 12];
+/// What is mostly lines encloses nothing.
+const LINES: f64 = 0.8;
+
+/// The regions that contours enclose, the largest and most symmetric first. Contours that do not
+/// close, such as those of an object that is cut off by the frame, enclose nothing.
+pub fn enclosed(map: &ContourMap, options: &CandidateOptions) -> Vec<Candidate> {
+    let longer = map.width.max(map.height);
+    if map.is_empty() || longer == 0 {
+        return Vec::new();
+    }
+    // No finer than the map is: its points would lie apart.
+    let size = f64::from(options.size.clamp(16, 1024).min(longer));
+    let side = |n: u32| (f64::from(n) * size / f64::from(longer)).round().max(1.0) as u32;
+    let small = map.scaled_to(side(map.width), side(map.height));
+    let (w, h) = (small.width as usize, small.height as usize);
+    let lines = drawn(&small);
+    let least = (LEAST * (w * h) as f64) as usize;
+    let regions = GAPS.iter().flat_map(|gap| closed(w, h, &lines, *gap, least));
+    let score = |area: &Area| symmetry(area).powi(4) * (area.count as f64 / (w * h) as f64).sqrt();
+    let regions = regions.map(|area| (score(&area), area)).collect();
+    let gradient = across(&small);
+    let edges = Edges { gradient: &gradient, strong: 1.0 };
+    let scale = [f64::from(map.width) / w as f64, f64::from(map.height) / h as f64];
+    let candidate = |(score, area)| Candidate::new(score, area, &edges, scale);
+    suppressed(regions, OVERLAP, options.most).into_iter().filter_map(candidate).collect()
+}
+
+/// What lines enclose that are made wider by some pixels, less what they were made wider by: regions of at least so many pixels.
+fn closed(w: usize, h: usize, lines: &[bool], by: usize, least: usize) -> Vec<Area> {
+    let Some(wide) = Area::new(w, h, lines.to_vec()) else { return Vec::new() };
+    let Some(wide) = Area::new(w, h, wide.dilated(by)).map(Area::filled) else { return Vec::new() };
+    let outside = Area::new(w, h, wide.on.iter().map(|on| !on).collect());
+    let outside = outside.map_or_else(|| vec![false; w * h], |o| o.dilated(by));
+    let (of, sizes) = components(w, h, |p| u32::from(!outside[p]));
+    let region = |(number, size): (usize, &usize)| {
+        if *size < least {
+            return None;
+        }
+        let on = |p: usize| !outside[p] && of[p] == number as u32;
+        let area = Area::new(w, h, (0..w * h).map(on).collect())?;
+        let line = area.on.iter().zip(lines).filter(|(on, line)| **on && **line).count();
+        ((line as f64) < LINES * area.count as f64).then_some(area)
+    };
+    sizes.iter().enumerate().filter_map(region).collect()
+}
+
+/// The pixel at a place, if it is in the picture.
+fn pixel(map: &ContourMap, x: f32, y: f32) -> Option<usize> {
+    let inside = x >= 0.0 && y >= 0.0 && x < map.width as f32 && y < map.height as f32;
+    inside.then(|| y as usize * map.width as usize + x as usize)
+}
+
+/// The pixels that contours run through.
+fn drawn(map: &ContourMap) -> Vec<bool> {
+    let mut on = vec![false; map.width as usize * map.height as usize];
+    for (((x, y), tx), ty) in map.x.iter().zip(&map.y).zip(&map.tx).zip(&map.ty) {
+        for by in [-REACH, 0.0, REACH] {
+            if let Some(p) = pixel(map, x + by * tx, y + by * ty) {
+                on[p] = true;
+            }
+        }
+    }
+    on
+}
+
+/// Edges of strength 1 along contours, which fade within a pixel or two.
+fn across(map: &ContourMap) -> Gradient {
+    let pixels = map.width as usize * map.height as usize;
+    let (mut magnitude, mut tensor) = (vec![0.0f32; pixels], vec![[0.0f32; 3]; pixels]);
+    for (((x, y), tx), ty) in map.x.iter().zip(&map.y).zip(&map.tx).zip(&map.ty) {
+        for (i, j) in (-2..=2).flat_map(|j| (-2..=2).map(move |i| (i as f32, j as f32))) {
+            let Some(p) = pixel(map, x + i, y + j) else { continue };
+            let (cx, cy) = ((x + i).floor() + 0.5 - x, (y + j).floor() + 0.5 - y);
+            let strength = libm::expf(-0.5 * (cx * cx + cy * cy));
+            if strength > magnitude[p] {
+                magnitude[p] = strength;
+                let square = strength * strength;
+                tensor[p] = [ty * ty * square, -tx * ty * square, tx * tx * square];
+            }
+        }
+    }
+    Gradient { width: map.width, height: map.height, magnitude, tensor }
+}
