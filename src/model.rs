@@ -143,7 +143,7 @@ impl Model {
                     d = d.note(format!("in the last of them {}", drawn.join(", ")));
                 }
                 d.hint(match zero.terms.first().is_some_and(|t| t.outside.is_some()) {
-                    true => "check the data, or observe them under a distribution that can give them",
+                    true => "check the data, or observe them under a distribution that can give them, in some state at least",
                     false => "widen the prior or the spread of what is observed; a factor of -inf rules a state out",
                 })
             }

@@ -34,10 +34,14 @@ fn chains_of_a_run_have_one_form() {
     f.succeeds(&["run", "parts.pcad", "--chains", "4", "--quiet", "--out", "steps"]);
     let chains = all("steps");
     assert!(chains.iter().all(|(names, draws)| *names == chains[0].0 && draws.len() == 400), "{}", chains[0].0);
-    assert!(chains[0].0.ends_with("k,w.1,w.2,w.3,w.4,w.5,w.6"), "{}", chains[0].0);
+    let most = chains.iter().flat_map(|(_, draws)| draws).map(|d| d[6] as usize).max().unwrap();
+    let ws: String = (1..=most).map(|i| format!("w.{i},")).collect();
+    assert!(most > 3 && chains[0].0.ends_with(&format!("k,{ws}log_lik.1")), "{}", chains[0].0);
     for draw in chains.iter().flat_map(|(_, draws)| draws) {
-        let (k, w) = (draw[4] as usize, &draw[5..]);
+        let (k, w) = (draw[6] as usize, &draw[7..7 + most]);
         assert!(w[..k].iter().all(|x| x.is_finite()) && w[k..].iter().all(|x| x.is_nan()), "{draw:?}");
+        // The log density of what is observed, whatever its structure; and the joint's part.
+        assert!((draw[draw.len() - 1] - draw[4]).abs() < 1e-9, "{draw:?}");
     }
     // In a limit of time chains come to numbers of draws of their own: the files have as many as all have, all are kept.
     f.succeeds(&["run", "parts.pcad", "--chains", "4", "--time", "700ms", "--quiet", "--out", "time"]);
@@ -56,7 +60,7 @@ fn chains_of_a_run_have_one_form() {
     f.succeeds(&["run", "parts.pcad", "--chains", "4", "--time", "1200ms", "--quiet", "--resume", "--out", "time"]);
     let again = all("time");
     assert!(again[0].1.len() > chains[0].1.len() && again.iter().all(|c| c.1.len() == again[0].1.len()));
-    assert!(again.iter().zip(&chains).all(|(new, old)| new.1[0][..4] == old.1[0][..4]), "the first draws stay");
+    assert!(again.iter().zip(&chains).all(|(new, old)| new.1[0][..6] == old.1[0][..6]), "the first draws stay");
 }
 
 #[test]
@@ -97,7 +101,8 @@ fn zeros_and_ones_are_truth_values() {
         assert!((mean - 2.0 / 3.0).abs() < 0.02, "{form}: {mean}");
     }
     f.write("bits.pcad", program("observe flip(p) = [1, 0, 2, 1];"));
-    f.refuses(&["run", "bits.pcad", "--out", "no"], "no chain can start");
+    let d = f.run(&["run", "bits.pcad", "--out", "no"]);
+    assert!(d.code == 1 && d.err.contains("2 is observed"), "{}", d.err);
 }
 
 /// What no choice can give is named, with its place and the support.
@@ -166,4 +171,54 @@ fn names_are_found_as_people_type_them() {
         let d = f.succeeds(&["doc", "--search", words]);
         assert!(d.out.starts_with(name), "{words}: {}", d.out);
     }
+}
+
+/// Each draw that was kept can be drawn again, and the prompt takes up where the run ended.
+#[test]
+fn runs_are_opened_again() {
+    let f = Folder::new("again");
+    f.write(
+        "ball.pcad",
+        "include \"std/scene.pcad\" as scene;
+         param size = 0.3;
+         assume x ~ normal(0, 0.5); observe normal(x, 0.1) = 0.4 as y;
+         assume view = scene.render(scene.affine(translate = [x, 0, 0]) * scene.sphere(size));
+         infer { warmup 100 { drift(@x); } repeat 500 { drift(@x); collect x; } }",
+    );
+    f.succeeds(&["run", "ball.pcad", "--set", "size=0.5", "--chains", "2", "--keep", "20", "--quiet", "--out", "out"]);
+    let kept: Vec<Value> = f.read("out/traces.jsonl").lines().map(|l| serde_json::from_str(l).unwrap()).collect();
+    assert!((10..=20).contains(&kept.len()), "{}", kept.len());
+    let list = f.succeeds(&["show", "out"]).out;
+    assert!(list.starts_with("pcadlang run ball.pcad --set size=0.5 --seed 1 --chains 2"), "{list}");
+    assert!(list.contains("\n3: chain 1, draw ") && list.contains("@x"), "{list}");
+    // The third state is the draw that it says: its choice is that of the file of draws.
+    let (_, draws) = chain(&f, "out/chain-1.csv");
+    let draw = kept[2]["draw"].as_u64().unwrap() as usize;
+    let said = f.succeeds(&["show", "out", "--draw", "3"]).out;
+    let x: f64 =
+        said.lines().find(|l| l.starts_with("@x ")).unwrap().split_whitespace().nth(1).unwrap().parse().unwrap();
+    assert!((x - draws[draw - 1][6]).abs() < 1e-3, "{said}: {:?}", draws[draw - 1]);
+    for (n, name) in [("1", "a.png"), ("2", "b.png"), ("3", "c.obj"), ("4", "d.glb")] {
+        f.succeeds(&["show", "out", "--draw", n, "-o", name]);
+        assert!(f.exists(name), "{name}");
+    }
+    assert_ne!(std::fs::read(f.path().join("a.png")).unwrap(), std::fs::read(f.path().join("b.png")).unwrap());
+    // The settings of the run are applied: a ball of 0.5, not of 0.3.
+    let highest = f
+        .read("c.obj")
+        .lines()
+        .filter_map(|l| l.strip_prefix("v ")?.split(' ').nth(1)?.parse().ok())
+        .fold(0.0, f64::max);
+    assert!((highest - 0.5).abs() < 0.01, "{highest}");
+    f.refuses(&["show", "out", "--draw", "99"], "there is no kept state 99");
+    f.refuses(&["show", "out", "-o", "x.bmp"], "has to end in .png, .obj or .glb");
+    f.refuses(&["show", "."], "holds no run");
+    let mut prompt = assert_cmd::Command::cargo_bin("pcadlang").unwrap();
+    let done = prompt.current_dir(f.path()).args(["repl", "out"]).write_stdin("size\nx\n").output().unwrap();
+    let said = String::from_utf8_lossy(&done.stdout).into_owned();
+    let best = json(&f, "out/best.trace.json");
+    let lines: Vec<&str> = said.lines().collect();
+    assert!(lines.contains(&"0.5"), "{said}");
+    let x = best["choices"][0].to_string();
+    assert!(lines.iter().any(|l| l.len() > 4 && x.contains(&l[..5])), "{said} {x}");
 }

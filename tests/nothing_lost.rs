@@ -61,6 +61,9 @@ fn readable(folder: &Path) -> usize {
     let mut checkpoints = 0;
     for file in std::fs::read_dir(&out).unwrap() {
         let path = file.unwrap().path();
+        if path.is_dir() {
+            continue;
+        }
         let bytes = std::fs::read(&path).unwrap();
         match path.extension().and_then(|e| e.to_str()) {
             Some("csv") => drop(csv::read(std::str::from_utf8(&bytes).unwrap()).unwrap()),

@@ -2,7 +2,9 @@
 
 use super::detect::Detect;
 use super::files::program_name;
+use super::manual::{Completions, Man};
 use super::people::Who;
+use super::show::Show;
 use clap::builder::{PossibleValuesParser, TypedValueParser};
 use clap::{Args, Parser, Subcommand, ValueHint};
 use pcadlang::tradeoff::Quality;
@@ -11,7 +13,7 @@ use std::time::Duration;
 
 /// From a photograph back to a 3D scene, by Bayesian inference.
 #[derive(Debug, Parser)]
-#[command(name = "pcadlang", version, max_term_width = 100)]
+#[command(name = "pcadlang", version, max_term_width = 100, after_help = super::EXIT_CODES)]
 pub struct Cli {
     /// What to do.
     #[command(subcommand)]
@@ -47,6 +49,8 @@ pub enum Command {
     Fmt(Fmt),
     /// Print a script that completes commands in a shell
     Completions(Completions),
+    /// Show a state of a run that has ended: a picture, a mesh, or its choices
+    Show(Show),
     /// Print the manual page, or write one for every command
     Man(Man),
 }
@@ -193,6 +197,9 @@ pub struct Run {
     /// The time between checkpoints, which are what a run goes on from
     #[arg(long, value_parser = duration, default_value = "10s", value_name = "TIME")]
     pub checkpoint: Duration,
+    /// How many whole states are kept for `show`, of all chains together, at even distances
+    #[arg(long, default_value_t = 100, value_name = "N", value_parser = clap::value_parser!(u32).range(..=100_000))]
+    pub keep: u32,
     /// Also say what was modelled, proposed, redrawn and skipped, and why
     #[arg(long)]
     pub explain: bool,
@@ -472,27 +479,13 @@ pub struct Fmt {
     pub stdin: bool,
 }
 
-/// `completions`.
-#[derive(Args, Debug)]
-pub struct Completions {
-    /// The shell
-    pub shell: clap_complete::Shell,
-}
-
-/// `man`.
-#[derive(Args, Debug)]
-pub struct Man {
-    /// The folder to write pages to, one for each command: pcadlang.1, pcadlang-run.1, …
-    #[arg(long, value_name = "DIR", value_hint = ValueHint::DirPath)]
-    pub out: Option<PathBuf>,
-}
-
 /// `repl`.
 #[derive(Args, Debug)]
 #[command(after_help = PROMPT)]
 pub struct Repl {
-    /// The program to begin with: a file, or the name of a shipped one; an empty one if left out
-    #[arg(value_name = "PROG", value_parser = program_name)]
+    /// The program to begin with: a file, the name of a shipped one, or the folder of a run, whose program, data, settings and best
+    /// state are taken up; an empty one if left out
+    #[arg(value_name = "PROG|RUN", value_parser = program_name)]
     pub program: Option<String>,
     /// Set a `param`, its value as in a program; may be repeated
     #[arg(long = "set", value_name = "NAME=VALUE", value_parser = pair, requires = "program")]

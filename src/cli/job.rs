@@ -7,10 +7,11 @@ use super::best::{disagreement, keep_best, show_best};
 use super::keypoints::Joints;
 use super::places::{best_of_each, show_places};
 use super::progress::{self, Ending};
+use super::reopened::{TRACES, arguments};
 use super::{Failure, edges, files, given, people, plain};
 use pcadlang::bank::BankFiles;
 use pcadlang::infer::draws::{KernelStats, MOST_POINTS, Sink, SiteStats};
-use pcadlang::infer::{BestSoFar, BestState, ChainResult, Evidence, Progress, Watch, Watches};
+use pcadlang::infer::{BestSoFar, BestState, ChainResult, Evidence, KeptTraces, Progress, Watch, Watches};
 use pcadlang::lang::{self, builtins::scene::ImageValue};
 use pcadlang::report::html::{MeshData, Page, page};
 use pcadlang::report::{
@@ -69,7 +70,8 @@ impl Ready {
         self.photo().map(|p| (p.width(), p.height()))
     }
 
-    fn photo(&self) -> Option<&Photo> {
+    /// The photograph, if there is one.
+    pub fn photo(&self) -> Option<&Photo> {
         self.image.as_ref()?.1.downcast::<ImageValue>()?.as_photo()
     }
 }
@@ -200,6 +202,7 @@ pub fn record(job: &Job, program_hash: &str, inputs: &str) -> Map<String, Value>
         "program_hash": program_hash,
         "inputs_hash": inputs,
         "seed": s.seed,
+        "arguments": arguments(job),
         "observe": observed(job).collect::<Vec<_>>(),
         "set": job.given.sets.iter().map(|(k, v)| (k.clone(), json!(v))).collect::<Map<_, _>>(),
         "settings": {
@@ -253,6 +256,8 @@ pub struct Manner {
     pub checkpoint: Duration,
     /// Whether it goes on with what the folder has.
     pub resume: bool,
+    /// How many whole states are kept.
+    pub keep: u32,
 }
 
 /// Runs the chains and fills the folder. A failure is recorded there too.
@@ -304,7 +309,8 @@ fn fill(
     let best = Arc::new(BestSoFar::new(s.chains(), &progress));
     // A single chain has one mode.
     let evidence = Arc::new(Evidence::new(if s.chains() > 1 { s.chains() } else { 0 }));
-    let watches: Vec<Arc<dyn Watch>> = vec![Arc::new(joints.clone()), best.clone(), evidence.clone()];
+    let kept = Arc::new(KeptTraces::new(s.chains(), manner.keep as usize, model.hash()));
+    let watches: Vec<Arc<dyn Watch>> = vec![Arc::new(joints.clone()), best.clone(), evidence.clone(), kept.clone()];
     let options = options(job, ready, Some(Arc::new(Watches(watches))));
     let memories: Vec<Memory> = (0..s.chains()).map(|_| Memory::bounded(ROOM / s.chains() as usize)).collect();
     let sinks = sinks(dir, job, model, &memories, record, manner.resume)?;
@@ -314,18 +320,20 @@ fn fill(
         scope.spawn(|| progress::watch(&progress, &ending, options.time, !manner.live));
         scope.spawn(|| progress::ask_for_checkpoints(&progress, &ending, manner.checkpoint));
         scope.spawn(|| keep_best(dir, model, &best, &ending, manner.checkpoint));
+        scope.spawn(|| keep_traces(dir, &kept, &ending, manner.checkpoint));
         ending.of(|| model.run_into(&options, threads(job), &progress, sinks))
     })?;
     let interrupted = progress.cancelled.load(Ordering::Relaxed);
     let sampled = begun.elapsed().as_secs_f64();
 
     let chains = results.into_iter().collect::<Result<Vec<_>, _>>().map_err(|e| model.chain_error(e))?;
+    write_traces(dir, &kept)?;
     let mut draws: Vec<ChainDraws> = memories.iter().map(Memory::draws).collect();
     // A run that may go on keeps all that it has.
-    let kept = align(dir.path(), s.chains(), !interrupted);
-    let kept = kept.map_err(|e| plain(format!("{}: {e}; its draws are kept", dir.path().display())))?;
-    if let Some(kept) = kept {
-        draws.iter_mut().for_each(|d| d.rows.retain(|r| r.draw < kept));
+    let even = align(dir.path(), s.chains(), !interrupted);
+    let even = even.map_err(|e| plain(format!("{}: {e}; its draws are kept", dir.path().display())))?;
+    if let Some(even) = even {
+        draws.iter_mut().for_each(|d| d.rows.retain(|r| r.draw < even));
     }
     widen(&mut draws);
     let points = chains.first().map_or_else(Vec::new, |c| c.last.points(MOST_POINTS));
@@ -385,6 +393,20 @@ fn fill(
         seconds: elapsed,
         interrupted,
     })
+}
+
+/// Writes the states that are kept so far, one to a line, from time to time until the chains end.
+fn keep_traces(dir: &RunDir, kept: &KeptTraces, ending: &Ending, every: Duration) {
+    while !ending.within(every) {
+        // What cannot be written is said at the end.
+        let _ = write_traces(dir, kept);
+    }
+}
+
+fn write_traces(dir: &RunDir, kept: &KeptTraces) -> Result<(), Failure> {
+    let lines =
+        kept.all().iter().filter_map(|k| serde_json::to_string(k).ok()).fold(String::new(), |s, k| s + &k + "\n");
+    if lines.is_empty() { Ok(()) } else { write(dir, TRACES, lines.as_bytes()) }
 }
 
 /// What is approximate in a run: in its likelihoods, and by its limits.
@@ -460,6 +482,7 @@ fn settings(job: &Job, model: &Model, elapsed: f64) -> Vec<(&'static str, String
         ("seed", job.sampling.seed.to_string()),
         ("chains", job.sampling.chains().to_string()),
         ("time", seconds(elapsed)),
+        ("command", format!("pcadlang run {}", super::show::quoted(&arguments(job)))),
     ];
     all.extend(job.given.sets.iter().map(|(k, v)| ("set", format!("{k} = {v}"))));
     all.extend(observed(job).map(|o| ("observe", o)));

@@ -1,9 +1,25 @@
 //! `pcadlang completions` and `pcadlang man`.
 
-use super::args::{Cli, Completions, Man};
+use super::args::Cli;
 use super::{Failure, files, plain};
-use clap::CommandFactory;
+use clap::{Args, CommandFactory, ValueHint};
 use std::io::Write;
+use std::path::PathBuf;
+
+/// `completions`.
+#[derive(Args, Debug)]
+pub struct Completions {
+    /// The shell
+    pub shell: clap_complete::Shell,
+}
+
+/// `man`.
+#[derive(Args, Debug)]
+pub struct Man {
+    /// The folder to write pages to, one for each command: pcadlang.1, pcadlang-run.1, …
+    #[arg(long, value_name = "DIR", value_hint = ValueHint::DirPath)]
+    pub out: Option<PathBuf>,
+}
 
 /// Prints what a shell reads to complete commands, options and files.
 pub fn completions(a: &Completions) -> Result<(), Failure> {

@@ -26,10 +26,12 @@ mod places;
 mod predict;
 mod progress;
 mod quality;
+mod reopened;
 mod repl;
 mod run;
 mod sample;
 mod scene;
+mod show;
 mod term;
 mod tradeoff;
 mod watch;
@@ -72,7 +74,12 @@ fn plain(message: impl Into<String>) -> Failure {
     Failure::Plain(message.into(), None)
 }
 
-/// Runs a command. Exit codes: 0 done, 1 program or data error, 2 usage (by clap), 3 interrupted.
+/// What `--help` and the manual pages say of exit codes.
+pub const EXIT_CODES: &str = "\
+Exit codes: 0 done, 1 the program, its data or a file is at fault, 2 the command line is, 3 interrupted (what there is is kept), 130 \
+interrupted twice.";
+
+/// Runs a command, and gives the exit code.
 pub fn main(cli: Cli) -> ExitCode {
     let done = match cli.command {
         Command::Run(a) => run::run(&a),
@@ -91,6 +98,7 @@ pub fn main(cli: Cli) -> ExitCode {
         Command::Fmt(a) => fmt::fmt(&a),
         Command::Completions(a) => manual::completions(&a),
         Command::Man(a) => manual::man(&a),
+        Command::Show(a) => show::show(&a),
     };
     match done {
         Ok(()) => ExitCode::SUCCESS,

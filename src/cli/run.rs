@@ -25,7 +25,7 @@ pub fn run(a: &Run) -> Result<(), Failure> {
         Some(path) => RunDir::create(path).map_err(|e| plain(e.to_string()))?,
         None => RunDir::fresh(runs, name).map_err(|e| plain(e.to_string()))?,
     };
-    let manner = Manner { live: !(a.quiet || a.json), checkpoint: a.checkpoint, resume: a.resume };
+    let manner = Manner { live: !(a.quiet || a.json), checkpoint: a.checkpoint, resume: a.resume, keep: a.keep };
     let outcome = job::perform(job, &ready, &dir, &record, &interrupt, manner)?;
     let explained = a.explain.then(|| explain(&ready.model, &outcome, job.sampling.seed));
     if let Some(explained) = &explained {

@@ -18,6 +18,7 @@ mod expr;
 mod force;
 mod foreign;
 mod init;
+mod kept;
 mod kernel;
 mod kernels;
 mod neighbours;
@@ -36,7 +37,6 @@ mod watches;
 
 use crate::platform::threads as parallel;
 pub(crate) use crate::platform::threads::in_parallel;
-#[doc(hidden)]
 pub use best::{BestSoFar, BestState};
 #[doc(hidden)]
 pub use chains::run_chains;
@@ -51,6 +51,8 @@ pub(crate) use foreign::KernelMaker;
 pub(crate) use init::attempts;
 #[doc(hidden)]
 pub use init::{Start, StartError, starts};
+#[doc(hidden)]
+pub use kept::{KeptTrace, KeptTraces};
 pub(crate) use kernel::accepts;
 pub use kernel::{At, Kernel, Outcome, Pick, Scope, decide, recoverable};
 #[doc(hidden)]

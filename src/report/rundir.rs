@@ -12,7 +12,8 @@ pub const MARK: &str = "run.json";
 /// What it holds while an earlier run is cleared away.
 const CLEARED: &[u8] = b"{}";
 /// What a run writes besides `run.json`, the draws `chain-N.csv`, and what its program exports.
-const WRITTEN: [&str; 14] = [
+const WRITTEN: [&str; 15] = [
+    "traces.jsonl",
     super::zarr::ZARR,
     "summary.json",
     "best.trace.json",

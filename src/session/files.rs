@@ -8,6 +8,17 @@ use std::path::Path;
 use std::sync::Arc;
 
 impl Session {
+    /// Takes up a saved state of the program, as if the session had come to it.
+    ///
+    /// # Errors
+    /// If it is of another program, or other data or settings.
+    pub fn take_up(&mut self, saved: &SavedTrace) -> Result<Reply, Trouble> {
+        let code = Arc::clone(self.model.code());
+        let loaded = Trace::load(code, self.model.hash(), saved, self.limits.clone());
+        self.trace = loaded.map_err(|e| Trouble::plain(e.to_string()))?;
+        Ok(Reply::text(self.summary()))
+    }
+
     /// `:save NAME`.
     pub(super) fn save(&mut self, name: &str) -> Result<Reply, Trouble> {
         let name = bare(name);

@@ -26,6 +26,7 @@ pub use export::{exported, exported_operand};
 pub use picture::{Picture, detected, drawn, over, strokes};
 pub use reply::{Reply, Trouble};
 pub use run::Status;
+pub use shown::short;
 
 use crate::lang::code::{Eager, Observed};
 use crate::model::{Error, Model, Program};

@@ -35,7 +35,7 @@ pub(super) fn whole(v: &Value) -> String {
 }
 
 /// A value in a few letters, numbers to four digits.
-pub(super) fn short(v: &Value) -> String {
+pub fn short(v: &Value) -> String {
     bounded(CELL, |out| write(out, v, &number))
 }
 

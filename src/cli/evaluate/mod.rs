@@ -211,7 +211,7 @@ impl<'a> Evaluation<'a> {
             let _ = job::record_failure(&dir, &t.record, failure, begun.elapsed().as_secs_f64());
         })?;
         let live = !(self.a.quiet || self.a.json);
-        let manner = Manner { live, checkpoint: CHECKPOINT, resume: false };
+        let manner = Manner { live, checkpoint: CHECKPOINT, resume: false, keep: 0 };
         job::perform(&t.job, &ready, &dir, &t.record, &self.interrupt, manner).map(|_| ())
     }
 

@@ -10,6 +10,7 @@ mod sixel;
 mod testing;
 
 use super::args::{Given, Graphics, Job, Repl, Sampling};
+use super::reopened::Reopened;
 use super::{Failure, given, has_colors, plain, term};
 use editor::{Lines, Typed, is_whole};
 use pcadlang::report::number;
@@ -17,6 +18,7 @@ use pcadlang::session::{Reply, Session, Status, Trouble};
 use pcadlang::trace::Stop;
 use std::cell::{Cell, RefCell};
 use std::io::{BufRead, IsTerminal, Write};
+use std::path::Path;
 use std::rc::Rc;
 use std::sync::Arc;
 use std::sync::atomic::{AtomicBool, AtomicU32, Ordering};
@@ -50,9 +52,21 @@ fn open(a: &Repl, stop: Stop) -> Result<(Session, Reply), Failure> {
     let Some(path) = &a.program else {
         return Session::new(a.seed, stop).map(|s| (s, Reply::default())).map_err(Failure::from);
     };
+    if Path::new(path).join("run.json").is_file() {
+        return reopened(Path::new(path), a.seed, stop);
+    }
     let job = job(a, path);
     let (program, _) = given::observe(given::program(&job.given, false)?, &job)?;
     Ok(Session::open(program, a.seed, stop)?)
+}
+
+/// The program, data and settings of a run, in its best state.
+fn reopened(folder: &Path, seed: u64, stop: Stop) -> Result<(Session, Reply), Failure> {
+    let run = Reopened::open(folder)?;
+    let (program, _) = given::observe(given::program(&run.job.given, true)?, &run.job)?;
+    let (mut session, _) = Session::open(program, seed, stop)?;
+    let said = session.take_up(&run.best()?)?;
+    Ok((session, said))
 }
 
 /// What the program is given, as `run` has it.
