@@ -93,7 +93,7 @@ fn run<T>(
     let options = RunOptions { seed: a.seed, ..RunOptions::default() };
     let sampler = PlanSampler { plan: &plan, options, progress: &progress };
     let said = std::thread::scope(|scope| {
-        scope.spawn(|| progress::watch(&progress, &ending, None, false));
+        scope.spawn(|| progress::watch(&progress, (settings.replicates as u32, "replicates"), &ending, None, false));
         ending.of(|| method(model.code(), &sampler, &settings))
     });
     if progress.cancelled.load(Ordering::Relaxed) {

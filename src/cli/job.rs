@@ -317,7 +317,7 @@ fn fill(
     let ending = Ending::default();
     interrupt.ends(&progress);
     let results = std::thread::scope(|scope| {
-        scope.spawn(|| progress::watch(&progress, &ending, options.time, !manner.live));
+        scope.spawn(|| progress::watch(&progress, (s.chains(), "chains"), &ending, options.time, !manner.live));
         scope.spawn(|| progress::ask_for_checkpoints(&progress, &ending, manner.checkpoint));
         scope.spawn(|| keep_best(dir, model, &best, &ending, manner.checkpoint));
         scope.spawn(|| keep_traces(dir, &kept, &ending, manner.checkpoint));

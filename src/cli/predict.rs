@@ -70,7 +70,7 @@ fn from_posterior(job: &Job, ready: &Ready) -> Result<Vec<Vec<Replication>>, Fai
     let interrupt = Interrupt::listen();
     interrupt.ends(&progress);
     let results = std::thread::scope(|scope| {
-        scope.spawn(|| progress::watch(&progress, &ending, s.time, false));
+        scope.spawn(|| progress::watch(&progress, (s.chains(), "chains"), &ending, s.time, false));
         ending.of(|| model.run_into(&options, job::threads(job), &progress, sinks))
     })?;
     results.into_iter().collect::<Result<Vec<_>, _>>().map_err(|e| model.chain_error(e))?;

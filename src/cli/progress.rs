@@ -1,15 +1,18 @@
-//! The live line of a run: only on a terminal.
+//! The live line of a run on a terminal; elsewhere a line every few seconds.
 
 use super::term;
 use indicatif::{ProgressBar, ProgressDrawTarget, ProgressStyle};
 use pcadlang::infer::Progress;
 use pcadlang::report::{number, seconds};
-use std::sync::atomic::{AtomicBool, AtomicU64, Ordering};
+use std::sync::atomic::{AtomicBool, AtomicU32, AtomicU64, Ordering};
 use std::sync::{Condvar, Mutex, PoisonError};
 use std::time::{Duration, Instant};
 
 /// Between two looks at the chains.
 const PAUSE: Duration = Duration::from_millis(100);
+
+/// Between two lines where nobody looks at a terminal: a file or a pipe.
+const BETWEEN_LINES: Duration = Duration::from_secs(5);
 
 /// The end of a run, which others wait for.
 #[derive(Default)]
@@ -40,27 +43,30 @@ impl Ending {
     }
 }
 
-/// Shows progress until the end; a limit of time makes it a bar.
-pub fn watch(progress: &Progress, ending: &Ending, limit: Option<Duration>, quiet: bool) {
-    if quiet || !term::is_live() {
+/// Shows progress until the end; a limit of time makes it a bar. `chains`: how many there are, and what they are called.
+pub fn watch(progress: &Progress, chains: (u32, &'static str), ending: &Ending, limit: Option<Duration>, quiet: bool) {
+    if quiet {
         return;
     }
     let begun = Instant::now();
+    if !term::is_live() {
+        while !ending.within(BETWEEN_LINES) {
+            error_line!("{}", line(&Known::of(progress, chains), begun.elapsed(), limit));
+        }
+        return;
+    }
     let length = limit.map(|t| u64::try_from(t.as_millis()).unwrap_or(u64::MAX));
     let bar = ProgressBar::with_draw_target(length, ProgressDrawTarget::stderr());
-    let template = if limit.is_some() { "{bar:24} {wide_msg}" } else { "{spinner} {wide_msg}" };
+    let template = if limit.is_some() { "{bar:10} {wide_msg}" } else { "{spinner} {wide_msg}" };
     if let Ok(style) = ProgressStyle::with_template(template) {
         bar.set_style(style);
     }
     while !ending.within(PAUSE) {
         let elapsed = begun.elapsed();
-        let steps = progress.steps.load(Ordering::Relaxed);
-        // No bits: nothing is known yet.
-        let best = Some(progress.best.load(Ordering::Relaxed)).filter(|bits| *bits != 0).map(f64::from_bits);
         if limit.is_some() {
             bar.set_position(u64::try_from(elapsed.as_millis()).unwrap_or(u64::MAX));
         }
-        bar.set_message(line(steps, elapsed, best, limit));
+        bar.set_message(line(&Known::of(progress, chains), elapsed, limit));
         bar.tick();
     }
     bar.finish_and_clear();
@@ -89,19 +95,62 @@ pub fn count(done: &AtomicU64, of: u64, over: &AtomicBool, quiet: bool) {
     bar.finish_and_clear();
 }
 
-/// What is said: steps and their rate, the best score, the time left (or the time taken, if there is no limit).
-fn line(steps: u64, elapsed: Duration, best: Option<f64>, limit: Option<Duration>) -> String {
-    let mut s = format!("{steps} steps");
-    if elapsed.as_secs_f64() >= 0.5 {
-        s.push_str(&format!(", {} a second", number((steps as f64 / elapsed.as_secs_f64()).round())));
+/// What is known of a run at a moment.
+#[derive(Clone, Copy, Debug, Default)]
+struct Known {
+    steps: u64,
+    best: Option<f64>,
+    started: u32,
+    warming: u32,
+    ended: u32,
+    /// How many chains there are, and what they are called.
+    chains: (u32, &'static str),
+}
+
+impl Known {
+    fn of(progress: &Progress, chains: (u32, &'static str)) -> Known {
+        let number = |n: &AtomicU32| n.load(Ordering::Relaxed);
+        // No bits: nothing is known yet.
+        let best = Some(progress.best.load(Ordering::Relaxed)).filter(|bits| *bits != 0).map(f64::from_bits);
+        Known {
+            steps: progress.steps.load(Ordering::Relaxed),
+            best,
+            started: number(&progress.started),
+            warming: number(&progress.warming),
+            ended: number(&progress.ended),
+            chains,
+        }
     }
-    if let Some(best) = best.filter(|b| b.is_finite()) {
-        s.push_str(&format!(", best log joint {best:.1}"));
+
+    /// What the chains do.
+    fn phase(&self) -> &'static str {
+        match self {
+            Known { started, ended, .. } if started == ended && *ended < self.chains.0 => "starts",
+            Known { started, ended, .. } if started == ended => "finishing",
+            Known { warming, .. } if *warming > 0 => "warm-up",
+            _ => "sampling",
+        }
+    }
+}
+
+/// What is said, what matters most first, as narrow terminals cut the end off: the phase, the time left (or taken, if there is no limit),
+/// the best score, steps and their rate.
+fn line(k: &Known, elapsed: Duration, limit: Option<Duration>) -> String {
+    let mut s = k.phase().to_owned();
+    if k.ended > 0 {
+        s.push_str(&format!(", {} of {} {} done", k.ended, k.chains.0, k.chains.1));
     }
     match limit {
         Some(limit) if elapsed < limit => s.push_str(&format!(", {} left", whole(limit - elapsed))),
-        Some(_) => s.push_str(", finishing"),
+        Some(_) => {}
         None => s.push_str(&format!(", {}", whole(elapsed))),
+    }
+    if let Some(best) = k.best.filter(|b| b.is_finite()) {
+        s.push_str(&format!(", best {best:.1}"));
+    }
+    s.push_str(&format!(", {} steps", k.steps));
+    if elapsed.as_secs_f64() >= 0.5 {
+        s.push_str(&format!(", {} a second", number((k.steps as f64 / elapsed.as_secs_f64()).round())));
     }
     s
 }
@@ -126,11 +175,19 @@ mod tests {
     #[test]
     fn the_line_says_what_is_known() {
         let s = Duration::from_secs;
-        assert_eq!(line(0, s(0), None, None), "0 steps, 0 s");
-        assert_eq!(
-            line(500, s(2), Some(-12.34), Some(s(300))),
-            "500 steps, 250 a second, best log joint -12.3, 4 min 58 s left"
+        let mut k = Known { chains: (4, "chains"), ..Known::default() };
+        assert_eq!(line(&k, s(0), None), "starts, 0 s, 0 steps");
+        (k.started, k.warming, k.steps, k.best) = (2, 2, 500, Some(-12.34));
+        assert_eq!(line(&k, s(2), Some(s(300))), "warm-up, 4 min 58 s left, best -12.3, 500 steps, 250 a second");
+        (k.started, k.warming, k.ended, k.steps) = (4, 0, 2, 12_345_678);
+        let said = line(&k, s(2), Some(s(300)));
+        assert!(
+            said.starts_with("sampling, 2 of 4 chains done, 4 min 58 s left, best -12.3, 12345678 steps"),
+            "{said}"
         );
-        assert_eq!(line(9, s(3), Some(f64::NEG_INFINITY), Some(s(3))), "9 steps, 3 a second, finishing");
+        // The bar and the line fit a terminal of 80 columns but for the rate.
+        assert!(said.find(" steps").is_some_and(|i| i + 6 + 11 <= 80), "{said}");
+        (k.ended, k.best) = (4, Some(f64::NEG_INFINITY));
+        assert_eq!(line(&k, s(3), Some(s(3))), "finishing, 4 of 4 chains done, 12345678 steps, 4115226 a second");
     }
 }

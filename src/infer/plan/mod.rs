@@ -22,7 +22,7 @@ use crate::trace::{Constraint, Draws, Limits, Trace};
 use runner::Runner;
 use std::fmt;
 use std::sync::Arc;
-use std::sync::atomic::{AtomicBool, AtomicU64};
+use std::sync::atomic::{AtomicBool, AtomicU32, AtomicU64, Ordering};
 use std::time::Duration;
 
 /// Bounds and settings of a run.
@@ -112,6 +112,12 @@ pub struct Progress {
     pub steps: AtomicU64,
     /// The best log joint density of any chain, as bits.
     pub best: AtomicU64,
+    /// Chains that have found where to start.
+    pub started: AtomicU32,
+    /// Chains that are in warm-up.
+    pub warming: AtomicU32,
+    /// Chains that have ended.
+    pub ended: AtomicU32,
 }
 
 /// What a chain leaves.
@@ -229,8 +235,10 @@ fn run_among(
     let population = Population::new(&begun);
     let trace = begun.swap_remove(0);
     let mut runner = Runner::new(code, plan, options, progress, sink, (chain, started), (trace, population));
-    runner.freeze()?;
-    runner.run(plan)
+    progress.started.fetch_add(1, Ordering::Relaxed);
+    let done = runner.freeze().and_then(|()| runner.run(plan));
+    progress.ended.fetch_add(1, Ordering::Relaxed);
+    done
 }
 
 /// The name and arguments of a call.

@@ -7,11 +7,13 @@ use crate::infer::selection::fail;
 use crate::lang::value::Value;
 use crate::rng::{Purpose, Stream, StreamKey};
 use crate::syntax::ast::{Arg, Expr, KStmt};
+use std::sync::atomic::Ordering;
 
 impl Runner<'_> {
     pub(super) fn warmup(&mut self, count: &Expr, body: &[KStmt], doing: Doing) -> Result<Flow, ChainError> {
         let (mut i, passes, first) = self.passes(count, doing)?;
         self.in_warmup = true;
+        self.progress.warming.fetch_add(1, Ordering::Relaxed);
         let mut flow = Flow::Next;
         // More passes than the program says only if they get somewhere: a loop without kernels would never end.
         let unbounded = self.options.warmup.is_some();
@@ -25,6 +27,7 @@ impl Runner<'_> {
         let (draws, mut rng) = (self.predictive(), self.population_stream());
         self.population.finish(&mut self.trace, draws, &mut rng)?;
         self.in_warmup = false;
+        self.progress.warming.fetch_sub(1, Ordering::Relaxed);
         self.power = 1.0;
         self.warmup_steps = self.step;
         Ok(if flow == Flow::End && self.is_cancelled() { Flow::End } else { Flow::Next })
