@@ -222,3 +222,26 @@ fn runs_are_opened_again() {
     let x = best["choices"][0].to_string();
     assert!(lines.iter().any(|l| l.len() > 4 && x.contains(&l[..5])), "{said} {x}");
 }
+
+/// What a run finds outside of its picture, and what it replaces, are said.
+#[test]
+fn what_is_outside_and_what_is_replaced_is_said() {
+    let f = Folder::new("outside-picture");
+    let program = |x: f64| {
+        format!(
+            "include \"std/scene.pcad\" as scene;
+             assume x ~ normal({x}, 0.01); observe normal(x, 1) = {x};
+             assume view = scene.render(scene.affine(translate = [x, 0, 0]) * scene.sphere(0.5));
+             infer {{ repeat 50 {{ drift(@x); }} }}"
+        )
+    };
+    let run = |x: f64| {
+        f.write("ball.pcad", program(x));
+        f.succeeds(&["run", "ball.pcad", "--chains", "2", "--out", "out"])
+    };
+    let (within, beyond) = (run(0.0), run(2.4));
+    assert!(!within.out.contains("outside of the picture") && !within.err.contains("is replaced"), "{}", within.err);
+    assert!(beyond.out.contains("most of the best scene is outside of the picture"), "{}", beyond.out);
+    assert!(beyond.err.contains("note: the run that was in out is replaced"), "{}", beyond.err);
+    f.succeeds(&["run", "ball.pcad", "--chains", "2", "--out", "fresh"]);
+}

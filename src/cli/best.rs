@@ -11,7 +11,7 @@ use pcadlang::geom::{Mesh, Solid, glb, obj};
 use pcadlang::infer::{BestSoFar, BestState, ChainResult};
 use pcadlang::lang::builtins::scene::ViewValue;
 use pcadlang::lang::value::Located;
-use pcadlang::render::View;
+use pcadlang::render::{Camera, View};
 use pcadlang::report::pictures::{self, png};
 use pcadlang::report::{RunDir, npy};
 use pcadlang::session::{detected, exported, exported_operand, over, strokes};
@@ -34,6 +34,8 @@ pub struct Shown {
     pub mesh: Option<Mesh>,
     /// What is seen.
     pub view: Option<ViewValue>,
+    /// The share of the mesh's corners that is in the picture.
+    pub inside: Option<f64>,
     /// How far the chains' last states cover the same pixels: those that all cover, as a share of those that any does.
     pub agreement: Option<f64>,
 }
@@ -125,11 +127,32 @@ fn draw(
     if let Some(mesh) = mesh(view.solid()) {
         write(dir, "best.obj", obj::write(&mesh).as_bytes())?;
         write(dir, "best.glb", &glb::write(&mesh))?;
+        shown.inside = inside(&mesh, camera);
         let positions: Vec<[f32; 3]> = mesh.positions.iter().map(|p| p.to_array()).collect();
         shown.positions = positions;
         shown.mesh = Some(mesh);
     }
     Ok(())
+}
+
+/// The share of a mesh's corners that is seen within the picture, in front of the camera.
+fn inside(mesh: &Mesh, camera: &Camera) -> Option<f64> {
+    let within = |p: &glam::Vec3| {
+        let (x, y, depth) = camera.project(p.as_dvec3());
+        let on = |v: f64, size: u32| (0.0..=f64::from(size)).contains(&v);
+        depth > 0.0 && on(x, camera.width) && on(y, camera.height)
+    };
+    let all = mesh.positions.len();
+    (all > 0).then(|| mesh.positions.iter().filter(|p| within(p)).count() as f64 / all as f64)
+}
+
+/// What to say of a scene of which less than half is in the picture.
+pub fn outside(shown: &Shown) -> Option<String> {
+    let inside = shown.inside.filter(|inside| *inside < 0.5)?;
+    Some(format!(
+        "most of the best scene is outside of the picture ({:.0} % of its mesh is inside): of the rest only the prior tells",
+        100.0 * inside
+    ))
 }
 
 /// The mesh of a solid; a solid too far away or too small for single precision has none, which is no reason to lose the run.

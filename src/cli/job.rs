@@ -3,7 +3,7 @@
 //! Invariant: `run.json` says `done` only when every other file of the folder is whole.
 
 use super::args::Job;
-use super::best::{disagreement, keep_best, show_best};
+use super::best::{disagreement, keep_best, outside, show_best};
 use super::keypoints::Joints;
 use super::places::{best_of_each, show_places};
 use super::progress::{self, Ending};
@@ -355,6 +355,7 @@ fn fill(
     let mut drawn = show_best(dir, s.seed, model, best.as_deref(), &chains, ready.photo())?;
     show_places(dir, s.seed, model, &places, ready.photo(), &mut drawn)?;
     warnings.extend(disagreement(&drawn));
+    warnings.extend(outside(&drawn));
     let summary = json!({
         "quantities": summaries(&quantities, kernel_seconds(&kernels)), "kernels": kernels, "choices": sites,
         "modes": modes, "warnings": warnings, "approximate": approximate, "every": every,

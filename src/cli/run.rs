@@ -19,6 +19,9 @@ pub fn run(a: &Run) -> Result<(), Failure> {
     let interrupt = Interrupt::listen();
     let record = job::record(job, ready.model.hash(), &job::inputs_hash(job, &ready.model)?);
     let (runs, name) = (Path::new("runs"), job::stem(&job.given.program));
+    if let Some(path) = a.out.as_ref().filter(|path| !a.resume && !a.quiet && earlier::left(path).is_some()) {
+        error_line!("note: the run that was in {} is replaced", path.display());
+    }
     let dir = match &a.out {
         Some(path) if a.resume => earlier::resumed(path, &record)?,
         None if a.resume => earlier::resumed(&RunDir::latest(runs, name), &record)?,
