@@ -223,6 +223,31 @@ fn runs_are_opened_again() {
     assert!(lines.iter().any(|l| l.len() > 4 && x.contains(&l[..5])), "{said} {x}");
 }
 
+#[test]
+fn runs_are_compared() {
+    let f = Folder::new("compared");
+    f.write(
+        "ball.pcad",
+        "include \"std/scene.pcad\" as scene;
+         param at = 0.4; param size = 0.3;
+         assume x ~ normal(0, 0.5); assume same ~ normal(0, 1); observe normal(x, 0.1) = at; observe normal(same, 1) = 0;
+         assume view = scene.render(scene.affine(translate = [x, 0, 0]) * scene.sphere(size));
+         infer { warmup 100 { drift(one(@**)); } repeat 500 { repeat 5 { drift(one(@**)); } collect x, same; } }",
+    );
+    f.succeeds(&["run", "ball.pcad", "--chains", "2", "--quiet", "--out", "a"]);
+    f.succeeds(&["run", "ball.pcad", "--chains", "2", "--set", "at=-0.4", "--quiet", "--out", "b"]);
+    let d = f.succeeds(&["compare", "a", "b", "-o", "both.png"]);
+    assert!(d.out.contains("only A: -\nonly B: --set at=-0.4\n"), "{}", d.out);
+    let rows: Vec<Vec<&str>> = d.out.lines().map(|l| l.split_whitespace().collect()).collect();
+    let row = |name: &str| rows.iter().position(|r| r.first() == Some(&name)).unwrap_or_else(|| panic!("{}", d.out));
+    let apart = |name: &str| rows[row(name)][5].parse::<f64>().unwrap();
+    assert!(row("x") < row("same") && apart("x") > 5.0 && apart("same") < 0.3, "{}", d.out);
+    let sheet = image::open(f.path().join("both.png")).unwrap();
+    assert!(sheet.width() > 2 * 512, "{}", sheet.width());
+    assert!(f.succeeds(&["compare", "a", "a"]).out.contains("are the same"));
+    f.refuses(&["compare", "a", "."], "holds no run");
+}
+
 /// What a run finds outside of its picture, and what it replaces, are said.
 #[test]
 fn what_is_outside_and_what_is_replaced_is_said() {

@@ -1,5 +1,6 @@
 //! The command line.
 
+use super::compare::Compare;
 use super::detect::Detect;
 use super::files::program_name;
 use super::manual::{Completions, Man};
@@ -51,6 +52,8 @@ pub enum Command {
     Completions(Completions),
     /// Show a state of a run that has ended: a picture, a mesh, or its choices
     Show(Show),
+    /// Compare two runs: what was set differently, their quantities, their pictures
+    Compare(Compare),
     /// Print the manual page, or write one for every command
     Man(Man),
 }

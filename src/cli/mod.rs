@@ -7,6 +7,7 @@ pub mod args;
 mod best;
 mod calibrate;
 mod check;
+mod compare;
 mod contours;
 mod detect;
 mod doc;
@@ -99,6 +100,7 @@ pub fn main(cli: Cli) -> ExitCode {
         Command::Completions(a) => manual::completions(&a),
         Command::Man(a) => manual::man(&a),
         Command::Show(a) => show::show(&a),
+        Command::Compare(a) => compare::compare(&a),
     };
     match done {
         Ok(()) => ExitCode::SUCCESS,
