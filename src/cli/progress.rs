@@ -138,7 +138,7 @@ impl Known {
 fn line(k: &Known, elapsed: Duration, limit: Option<Duration>) -> String {
     let mut s = k.phase().to_owned();
     if k.ended > 0 {
-        s.push_str(&format!(", {} of {} {} done", k.ended, k.chains.0, k.chains.1));
+        s.push_str(&format!(", {} of {} {}", k.ended, k.chains.0, k.chains.1));
     }
     match limit {
         Some(limit) if elapsed < limit => s.push_str(&format!(", {} left", whole(limit - elapsed))),
@@ -181,13 +181,10 @@ mod tests {
         assert_eq!(line(&k, s(2), Some(s(300))), "warm-up, 4 min 58 s left, best -12.3, 500 steps, 250 a second");
         (k.started, k.warming, k.ended, k.steps) = (4, 0, 2, 12_345_678);
         let said = line(&k, s(2), Some(s(300)));
-        assert!(
-            said.starts_with("sampling, 2 of 4 chains done, 4 min 58 s left, best -12.3, 12345678 steps"),
-            "{said}"
-        );
+        assert!(said.starts_with("sampling, 2 of 4 chains, 4 min 58 s left, best -12.3, 12345678 steps"), "{said}");
         // The bar and the line fit a terminal of 80 columns but for the rate.
         assert!(said.find(" steps").is_some_and(|i| i + 6 + 11 <= 80), "{said}");
         (k.ended, k.best) = (4, Some(f64::NEG_INFINITY));
-        assert_eq!(line(&k, s(3), Some(s(3))), "finishing, 4 of 4 chains done, 12345678 steps, 4115226 a second");
+        assert_eq!(line(&k, s(3), Some(s(3))), "finishing, 4 of 4 chains, 12345678 steps, 4.12e6 a second");
     }
 }

@@ -44,6 +44,7 @@ impl Column {
     }
 
     /// A column of `n` numbers.
+    #[doc(hidden)]
     pub fn vector(name: impl Into<String>, n: usize) -> Self {
         Column { name: name.into(), shape: Shape::Vector(n) }
     }

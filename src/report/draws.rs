@@ -25,6 +25,14 @@ impl Default for ChainDraws {
 
 impl Quantity {
     /// Why there is no R-hat; `None` if there is one.
+    ///
+    /// ```
+    /// let model = pcadlang::Model::from_text("assume x ~ normal(0, 1); infer { repeat 100 { collect x; } }")?;
+    /// let posterior = model.run(&pcadlang::RunOptions::default(), 2, 1)?;
+    /// let why = posterior.quantity("x").and_then(|q| q.why_no_r_hat());
+    /// assert_eq!(why, Some("it never moved in any chain, and the chains are at different values"));
+    /// # Ok::<(), pcadlang::Error>(())
+    /// ```
     pub fn why_no_r_hat(&self) -> Option<&'static str> {
         if !self.summary.r_hat.is_nan() {
             return None;
@@ -51,6 +59,7 @@ impl Quantity {
 
 impl ChainDraws {
     /// Puts the draws in other columns, among which theirs are.
+    #[doc(hidden)]
     pub fn widen(&mut self, columns: Vec<Column>) {
         let layout = Layout::new(&self.columns, &columns);
         if !layout.is_same(width(&self.columns)) {

@@ -91,6 +91,19 @@ impl Trace {
 
     /// The log density of each observed value: of each observation the hash of its address and those of its elements, one where what it
     /// observes has none. In order of the hashes, so that the same observations are in the same order. `None` if there are more than `most`.
+    ///
+    /// ```
+    /// let model = pcadlang::Model::from_text("assume x ~ normal(0, 1); observe normal(x, 1) = [1, 2] as y; observe poisson(3) = 2 as k;")?;
+    /// let trace = model.simulate(1, 0)?;
+    /// let all = trace.pointwise(100).unwrap_or_default();
+    /// let sum: f64 = all.iter().flat_map(|(_, scores)| scores).sum();
+    /// assert!((sum - trace.log_likelihood()).abs() < 1e-12);
+    /// let mut points = trace.points(100);
+    /// points.sort_by(|a, b| a.0.cmp(&b.0));
+    /// assert_eq!(points, [("k".to_owned(), 2.0), ("y[0]".to_owned(), 1.0), ("y[1]".to_owned(), 2.0)]);
+    /// assert!(trace.pointwise(2).is_none());
+    /// # Ok::<(), pcadlang::Error>(())
+    /// ```
     pub fn pointwise(&self, most: usize) -> Option<Vec<(u64, Vec<f64>)>> {
         let (g, code) = (&self.graph, &*self.code);
         let (mut all, mut count) = (Vec::new(), 0);
