@@ -10,7 +10,7 @@ if [ ! -x "$venv/bin/python" ] && ! python3 -m venv "$venv"; then
   echo "interop: no Python to make an environment with; NOT RUN"
   exit 0
 fi
-if ! "$venv/bin/pip" install --quiet --disable-pip-version-check -r tests/interop/requirements.txt; then
+if ! "$venv/bin/pip" install --quiet --retries 1 --timeout 20 --disable-pip-version-check -r tests/interop/requirements.txt; then
   echo "interop: ArviZ cannot be installed here; NOT RUN"
   exit 0
 fi
@@ -20,8 +20,8 @@ if [ -z "${PCADLANG:-}" ]; then
 fi
 out=$(mktemp -d)
 trap 'rm -rf "$out"' EXIT
-"$PCADLANG" run human.pcad --observe examples/images/skier.jpg --seed 1 --time 6s --quiet --out "$out/human"
-"$PCADLANG" run lathe.pcad --observe examples/images/coffee_cup.png --seed 1 --time 6s --quiet --out "$out/lathe"
+"$PCADLANG" run human.pcad --observe examples/images/skier.jpg --seed 1 --time 10s --quiet --out "$out/human"
+"$PCADLANG" run lathe.pcad --observe examples/images/coffee_cup.png --seed 1 --time 10s --quiet --out "$out/lathe"
 "$PCADLANG" run linreg.pcad --seed 1 --quiet --out "$out/linreg"
 "$PCADLANG" run tests/interop/parts.pcad --seed 1 --quiet --out "$out/parts"
 "$PCADLANG" run tests/interop/parts.pcad --seed 1 --time 1s --quiet --out "$out/timed"
