@@ -8,6 +8,15 @@ use folder::Folder;
 use serde_json::Value;
 use std::process::{Command, Stdio};
 
+/// A program that sees a ball at `x` of radius `size`: what comes before, and its plan.
+fn ball(before: &str, plan: &str) -> String {
+    format!(
+        "include \"std/scene.pcad\" as scene; {before}
+         assume view = scene.render(scene.affine(translate = [x, 0, 0]) * scene.sphere(size));
+         infer {{ {plan} }}"
+    )
+}
+
 fn json(f: &Folder, name: &str) -> Value {
     serde_json::from_str(&f.read(name)).unwrap_or_else(|e| panic!("{name}: {e}"))
 }
@@ -177,14 +186,8 @@ fn names_are_found_as_people_type_them() {
 #[test]
 fn runs_are_opened_again() {
     let f = Folder::new("again");
-    f.write(
-        "ball.pcad",
-        "include \"std/scene.pcad\" as scene;
-         param size = 0.3;
-         assume x ~ normal(0, 0.5); observe normal(x, 0.1) = 0.4 as y;
-         assume view = scene.render(scene.affine(translate = [x, 0, 0]) * scene.sphere(size));
-         infer { warmup 100 { drift(@x); } repeat 500 { drift(@x); collect x; } }",
-    );
+    let before = "param size = 0.3; assume x ~ normal(0, 0.5); observe normal(x, 0.1) = 0.4 as y;";
+    f.write("ball.pcad", ball(before, "warmup 100 { drift(@x); } repeat 500 { drift(@x); collect x; }"));
     f.succeeds(&["run", "ball.pcad", "--set", "size=0.5", "--chains", "2", "--keep", "20", "--quiet", "--out", "out"]);
     let kept: Vec<Value> = f.read("out/traces.jsonl").lines().map(|l| serde_json::from_str(l).unwrap()).collect();
     assert!((10..=20).contains(&kept.len()), "{}", kept.len());
@@ -226,14 +229,10 @@ fn runs_are_opened_again() {
 #[test]
 fn runs_are_compared() {
     let f = Folder::new("compared");
-    f.write(
-        "ball.pcad",
-        "include \"std/scene.pcad\" as scene;
-         param at = 0.4; param size = 0.3;
-         assume x ~ normal(0, 0.5); assume same ~ normal(0, 1); observe normal(x, 0.1) = at; observe normal(same, 1) = 0;
-         assume view = scene.render(scene.affine(translate = [x, 0, 0]) * scene.sphere(size));
-         infer { warmup 100 { drift(one(@**)); } repeat 500 { repeat 5 { drift(one(@**)); } collect x, same; } }",
-    );
+    let before = "param at = 0.4; param size = 0.3; assume x ~ normal(0, 0.5); assume same ~ normal(0, 1);
+         observe normal(x, 0.1) = at; observe normal(same, 1) = 0;";
+    let plan = "warmup 100 { drift(one(@**)); } repeat 500 { repeat 5 { drift(one(@**)); } collect x, same; }";
+    f.write("ball.pcad", ball(before, plan));
     f.succeeds(&["run", "ball.pcad", "--chains", "2", "--quiet", "--out", "a"]);
     f.succeeds(&["run", "ball.pcad", "--chains", "2", "--set", "at=-0.4", "--quiet", "--out", "b"]);
     let d = f.succeeds(&["compare", "a", "b", "-o", "both.png"]);
@@ -253,12 +252,8 @@ fn runs_are_compared() {
 fn what_is_outside_and_what_is_replaced_is_said() {
     let f = Folder::new("outside-picture");
     let program = |x: f64| {
-        format!(
-            "include \"std/scene.pcad\" as scene;
-             assume x ~ normal({x}, 0.01); observe normal(x, 1) = {x};
-             assume view = scene.render(scene.affine(translate = [x, 0, 0]) * scene.sphere(0.5));
-             infer {{ repeat 50 {{ drift(@x); }} }}"
-        )
+        let before = format!("let size = 0.5; assume x ~ normal({x}, 0.01); observe normal(x, 1) = {x};");
+        ball(&before, "repeat 50 { drift(@x); }")
     };
     let run = |x: f64| {
         f.write("ball.pcad", program(x));

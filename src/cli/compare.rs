@@ -1,9 +1,9 @@
 //! `pcadlang compare`: two runs side by side: what was set differently, what they say of each quantity, their pictures.
 
+use super::places::sized;
 use super::show::quoted;
 use super::{Failure, earlier, files, plain};
 use clap::Args;
-use image::imageops::{FilterType, resize};
 use pcadlang::report::pictures::{captioned_sheet, png};
 use pcadlang::report::{number, table};
 use serde_json::Value;
@@ -36,7 +36,7 @@ struct Told {
 
 impl Told {
     fn of(folder: &Path) -> Result<Told, Failure> {
-        let run = earlier::left(folder).ok_or_else(|| plain(format!("{} holds no run", folder.display())))?;
+        let run = earlier::run(folder)?;
         let path = folder.join("summary.json");
         let summary = serde_json::from_slice(&files::read(&path)?);
         Ok(Told { run, summary: summary.map_err(|e| plain(format!("{}: {e}", path.display())))? })
@@ -125,9 +125,7 @@ fn pictures(a: &Compare, out: &Path) -> Result<(), Failure> {
         let path = folder.join("overlay.png");
         let picture = image::load_from_memory(&files::read(&path)?);
         let picture = picture.map_err(|e| plain(format!("{}: {e}", path.display())))?.to_rgb8();
-        let scale = f64::from(SIDE) / f64::from(picture.width().max(picture.height()).max(1));
-        let [w, h] = [picture.width(), picture.height()].map(|v| ((f64::from(v) * scale) as u32).max(1));
-        Ok::<_, Failure>(resize(&picture, w, h, FilterType::Triangle))
+        Ok::<_, Failure>(sized(&picture, SIDE))
     };
     let both = [overlay(&a.a)?, overlay(&a.b)?];
     let captions = [&a.a, &a.b].map(|path| path.display().to_string());

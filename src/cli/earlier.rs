@@ -1,7 +1,7 @@
 //! What an earlier run left in a folder, and whether it is of the same settings.
 
 use super::{Failure, plain};
-use pcadlang::report::RunDir;
+use pcadlang::report::{RunDir, RunDirError};
 use serde_json::{Map, Value};
 use std::path::Path;
 
@@ -22,6 +22,14 @@ pub fn left(folder: &Path) -> Option<Value> {
     let run: Value = serde_json::from_slice(&bytes).unwrap_or_default();
     // Without a program, it was cleared away for the next one.
     run.get("program_hash").is_some().then_some(run)
+}
+
+/// The `run.json` of a folder.
+///
+/// # Errors
+/// If no run was begun there.
+pub fn run(folder: &Path) -> Result<Value, Failure> {
+    left(folder).ok_or_else(|| plain(RunDirError::NoRun(folder.to_owned()).to_string()))
 }
 
 /// What is another there than in the record of a run; empty if its draws are the same.

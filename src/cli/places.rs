@@ -3,6 +3,7 @@
 use super::best::Shown;
 use super::job::write;
 use super::{Failure, plain, scene};
+use image::RgbImage;
 use image::imageops::{FilterType, resize};
 use pcadlang::Model;
 use pcadlang::infer::{BestSoFar, BestState};
@@ -34,6 +35,13 @@ pub fn best_of_each(modes: &[Mode], best: &BestSoFar) -> Vec<(String, Arc<BestSt
     modes.iter().take(SHOWN).enumerate().filter_map(said).collect()
 }
 
+/// A picture with a longer side of so many pixels.
+pub fn sized(picture: &RgbImage, side: u32) -> RgbImage {
+    let scale = f64::from(side) / f64::from(picture.width().max(picture.height()).max(1));
+    let [w, h] = [picture.width(), picture.height()].map(|v| ((f64::from(v) * scale) as u32).max(1));
+    resize(picture, w, h, FilterType::Triangle)
+}
+
 /// Writes `modes.png` and shows it on the page, if there are several modes and something is seen.
 pub fn show_places(
     dir: &RunDir,
@@ -51,9 +59,7 @@ pub fn show_places(
         let camera = view.camera();
         let size = photo.map_or((camera.width, camera.height), |p| (p.width(), p.height()));
         let picture = over(&view, photo.map(Photo::rgb), size);
-        let scale = f64::from(SIDE) / f64::from(picture.width().max(picture.height()).max(1));
-        let [w, h] = [picture.width(), picture.height()].map(|v| ((f64::from(v) * scale) as u32).max(1));
-        pictures.push(resize(&picture, w, h, FilterType::Triangle));
+        pictures.push(sized(&picture, SIDE));
         captions.push(text.clone());
     }
     if pictures.len() < 2 {

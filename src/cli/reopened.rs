@@ -54,7 +54,7 @@ impl Reopened {
     /// # Errors
     /// If the folder holds no run, or one of a version that did not keep its command.
     pub fn open(folder: &Path) -> Result<Reopened, Failure> {
-        let run = super::earlier::left(folder).ok_or_else(|| plain(format!("{} holds no run", folder.display())))?;
+        let run = super::earlier::run(folder)?;
         let told = || {
             let hint = "run it again with this version; pictures of cases are kept by `evaluate` itself";
             Failure::Plain(format!("{}: its command was not kept", folder.display()), Some(hint.into()))
