@@ -108,6 +108,48 @@ fn scripts_end_at_the_first_error() {
     assert_eq!(piped(&f, &["--set", "n=3"], "").code, 2, "nothing to set without a program");
 }
 
+/// The program goes through the user's editor, and comes back; what is in the way of a file is said.
+#[cfg(unix)]
+#[test]
+fn programs_are_edited_and_saved() {
+    let f = Folder::new("repl_edited");
+    let session = |editor: &str, script: &str| {
+        let mut c = Command::cargo_bin("pcadlang").unwrap();
+        c.current_dir(f.path()).env("NO_COLOR", "1").env_remove("VISUAL").env("EDITOR", editor);
+        let o = c.args(["repl", "--transcript"]).write_stdin(script.to_owned()).output().unwrap();
+        String::from_utf8_lossy(&o.stdout).into_owned()
+    };
+    let script = "assume a ~ normal(0, 1)\n:set a 2\n:edit\n:list\na\n";
+    let said = session("sed -i s/normal(0,.1)/normal(0,3)/", script);
+    assert!(said.contains("1  assume a ~ normal(0,3);") && said.ends_with("2\n"), "{said}");
+    let wrong = session("sed -i s/assume/asume/", &format!("{script}:edit\n"));
+    assert!(wrong.contains("error") && wrong.contains("1  assume a ~ normal(0, 1);"), "{wrong}");
+    let none = session("no-such-editor", script);
+    assert!(none.contains("the editor `no-such-editor` cannot be started"), "{none}");
+    f.write("theirs.pcad", "let x = 1;\n");
+    let said = session("true", "let y = 2\n:save theirs\n:save! theirs\n:save theirs\n");
+    assert!(said.contains("theirs.pcad exists\n  = hint: `:save! theirs` overwrites it"), "{said}");
+    assert!(said.matches("theirs.pcad, theirs.trace.json").count() == 2 && f.read("theirs.pcad").contains("y = 2"));
+}
+
+/// A run is opened by its folder, at the start and from another session; `:undo` goes back.
+#[test]
+fn runs_are_loaded() {
+    let f = Folder::new("repl_runs");
+    f.write("coin.pcad", "assume p ~ beta(1, 1); observe binomial(10, p) = 7 as heads;\n");
+    let run = f.run(&["run", "coin.pcad", "--steps", "50", "--chains", "1", "--out", "runs/coin"]);
+    assert_eq!(run.code, 0, "{}", run.err);
+    let best = piped(&f, &["runs/coin"], "p\n");
+    let said = piped(&f, &[], "let q = 1\n:load runs/coin\np\n:undo\nq\n");
+    assert_eq!(said.code, 0, "{}", said.err);
+    let p = best.out.lines().last().unwrap();
+    assert!(
+        said.out.contains(&format!("\n{p}\nundone: :load runs/coin\n")) && said.out.ends_with("1\n"),
+        "{}",
+        said.out
+    );
+}
+
 /// The photograph that is observed is what the scene is shown over; `run`'s ways to give it work.
 #[test]
 fn a_photograph_is_given_as_to_run() {
@@ -175,18 +217,43 @@ fn on_a_terminal() {
     p.send_line("").unwrap();
     p.exp_string("\r\n42\r\n").unwrap();
     ready(&mut p);
-    // Ctrl-C during inference: everything is as it was.
+    // Ctrl-C during inference ends it and keeps its draws; `:undo` goes back.
     p.send_line(":set @height 0.25").unwrap();
     p.exp_string("log joint").unwrap();
     ready(&mut p);
     p.send_line(":infer mh(@height) 100000000000").unwrap();
+    p.exp_string("sampling, ").unwrap();
+    p.exp_string(" of 100000000000").unwrap();
     p.exp_string("Ctrl-C ends it").unwrap();
     p.send_control('c').unwrap();
-    p.exp_string("stopped; everything is as it was").unwrap();
+    p.exp_string("height").unwrap();
+    p.exp_string("stopped early; its draws are kept").unwrap();
+    ready(&mut p);
+    p.send_line(":undo").unwrap();
     ready(&mut p);
     p.send_line("height").unwrap();
     p.exp_string("\r\n0.25\r\n").unwrap();
     ready(&mut p);
+    // Ctrl-C in an evaluation: nothing has changed.
+    p.send_line("fold(fn(a, i) { a + i }, 0, 0 .. 10000000)").unwrap();
+    std::thread::sleep(Duration::from_millis(300));
+    p.send_control('c').unwrap();
+    p.exp_string("stopped; nothing has changed").unwrap();
+    ready(&mut p);
+    // A question before somebody else's file is overwritten.
+    f.write("mine.pcad", "let theirs = 1;\n");
+    p.send_line(":save mine").unwrap();
+    p.exp_string("mine.pcad exists; overwrite it? [y/N]").unwrap();
+    p.send_line("n").unwrap();
+    p.exp_string("nothing was done").unwrap();
+    ready(&mut p);
+    assert_eq!(f.read("mine.pcad"), "let theirs = 1;\n");
+    p.send_line(":save mine").unwrap();
+    p.exp_string("[y/N]").unwrap();
+    p.send_line("y").unwrap();
+    p.exp_string("mine.trace.json").unwrap();
+    ready(&mut p);
+    assert!(f.read("mine.pcad").contains("assume height"));
     // In the background.
     p.send_line(":infer mh(@height) 100000000000 &").unwrap();
     p.exp_string("run 2 in the background").unwrap();

@@ -77,7 +77,12 @@ fn an_error_leaves_everything_as_it_was() {
     let mut wrong = String::new();
     for (text, why) in [
         ("assume z ~ nomal(0, 1)", "normal"),
-        ("assume slope ~ normal(0, 1)", "bound twice"),
+        ("assume slope ~ nomal(0, 1)", "normal"),
+        ("let x = slope * 2", "not bound here"),
+        ("forget slop", "did you mean `slope`?"),
+        ("forget noise", "`y` uses `noise`"),
+        (":redo", "nothing to redo"),
+        (":help qqqq", "no statement, built-in or command"),
         ("let a = [1, 2][7]", "7"),
         ("assume z ~ normal(0, -1)", "sd"),
         ("let = 3", "expected"),
@@ -322,7 +327,7 @@ fn plans_of_all_kinds_run() {
 }
 
 #[test]
-fn what_is_stopped_has_done_nothing() {
+fn what_is_stopped_changes_nothing_but_inference_keeps_its_draws() {
     let stop = Arc::new(AtomicBool::new(false));
     let open = Session::open(Program::named("<session>", LINE).unwrap(), 1, Stop::when(Arc::clone(&stop)));
     let mut s = open.unwrap_or_else(|e| panic!("{e}")).0;
@@ -339,15 +344,195 @@ fn what_is_stopped_has_done_nothing() {
         stop.store(false, Ordering::SeqCst);
         assert!(matches!(done, Err(Trouble::Stopped)), "{text}: {done:?}");
     };
-    interrupted(&mut s, ":infer mh(one(@**)) 1000000000");
-    assert_eq!(state(&s), before);
     interrupted(&mut s, "let endless = fold(fn(a, i) { a + i }, 0, 0 .. 10000000)");
     assert_eq!(state(&s), before);
     // What runs in the background is not meant.
     says(&mut s, ":infer mh(one(@**)) 1000000000 &");
     interrupted(&mut s, ":wait");
-    assert!(says(&mut s, ":status").contains("running"));
-    assert!(says(&mut s, ":stop").contains("run 2"));
+    assert!(says(&mut s, ":status").contains("sampling"));
+    assert!(says(&mut s, ":stop").contains("run 1"));
+    // Inference in the foreground ends where it is.
+    says(&mut s, ":undo");
+    assert_eq!(state(&s), before);
+    let later = Arc::clone(&stop);
+    let ends = std::thread::spawn(move || {
+        std::thread::sleep(Duration::from_millis(150));
+        later.store(true, Ordering::SeqCst);
+    });
+    let said = says(&mut s, ":infer drift(one($continuous)) 1000000000");
+    ends.join().unwrap();
+    stop.store(false, Ordering::SeqCst);
+    assert!(said.ends_with("stopped early; its draws are kept, and `:undo` goes back\n"), "{said}");
+    assert!(said.lines().any(|l| l.starts_with("slope ")), "a table of means: {said}");
+    assert_ne!(state(&s), before);
+    assert!(says(&mut s, ":plot slope").contains(" draws, mean "));
+    assert!(says(&mut s, "slope + 1").trim().parse::<f64>().is_ok(), "and the session goes on");
+    says(&mut s, ":undo");
+    assert_eq!(state(&s), before);
+}
+
+/// A name that is bound again takes the place of the old one, for all that uses it.
+#[test]
+fn names_are_bound_again_and_forgotten() {
+    let mut s = line();
+    says(&mut s, ":set slope 2");
+    let before = state(&s);
+    let said = says(&mut s, "let x = [0, 2, 4, 6]");
+    assert!(said.contains("`x` is replaced; used by `y`"), "{said}");
+    assert!(s.text().starts_with("let x = [0, 2, 4, 6];\nassume slope"), "{}", s.text());
+    assert_eq!(says(&mut s, "slope"), "2\n", "choices stay");
+    says(&mut s, ":undo");
+    assert_eq!(state(&s), before);
+    // What depends on it is shown with its new values.
+    says(&mut s, "let double = 2 * slope");
+    says(&mut s, "fn f(a) { a + double }");
+    says(&mut s, "let three = f(1)");
+    let said = says(&mut s, "let double = 3 * slope");
+    assert!(said.contains("double = 6\nthree = 7\n"), "{said}");
+    // Where it needs what was bound later it moves there.
+    says(&mut s, "let last = 1");
+    says(&mut s, "let free = 1; let later = 2");
+    says(&mut s, "let free = later + 1");
+    assert_eq!(says(&mut s, "free"), "3\n");
+    // An old value that is not possible any more is drawn anew, the others stay.
+    says(&mut s, ":set intercept 0.25");
+    says(&mut s, "assume slope ~ uniform(5, 6)");
+    assert!((5.0..6.0).contains(&says(&mut s, "slope").trim().parse::<f64>().unwrap()));
+    assert_eq!(says(&mut s, "intercept"), "0.25\n");
+    // Observations and kernels by their names.
+    says(&mut s, "observe normal(slope, 1) = [1, 2] as y");
+    let observed = says(&mut s, ":trace");
+    assert!(observed.matches("@y").count() == 1 && s.text().matches(" as y").count() == 1, "{observed}");
+    says(&mut s, "kernel both() { drift(@slope); }");
+    says(&mut s, "kernel both() { drift(@intercept); }");
+    assert_eq!(s.text().matches("kernel both").count(), 1);
+    // Elements of a container are not the container.
+    says(&mut s, "z[0] ~ normal(0, 1)");
+    says(&mut s, "z[1] ~ normal(0, 1)");
+    assert!(s.text().contains("z[0] ~") && s.text().contains("z[1] ~"));
+
+    for name in ["y", "three", "@next", "last", "f"] {
+        says(&mut s, &format!("forget {name};"));
+    }
+    assert!(!s.text().contains("three") && !s.text().contains("observe"), "{}", s.text());
+    let why = refuses(&mut s, "forget slope");
+    assert!(why.contains("`double` uses `slope`") && why.contains("forget `double` first"), "{why}");
+    says(&mut s, "forget double");
+    says(&mut s, ":undo");
+    assert!(s.text().contains("let double"));
+}
+
+#[test]
+fn what_was_undone_is_done_again() {
+    let mut s = line();
+    let mut states = vec![state(&s)];
+    for text in ["let double = 2 * slope", ":set @slope 2.25", ":infer drift(one($continuous)) 50"] {
+        says(&mut s, text);
+        states.push(state(&s));
+    }
+    for before in states.iter().rev().skip(1) {
+        says(&mut s, ":undo");
+        assert_eq!(&state(&s), before);
+    }
+    for after in &states[1..] {
+        assert!(says(&mut s, ":redo").starts_with("redone: "));
+        assert_eq!(&state(&s), after);
+    }
+    says(&mut s, ":undo");
+    says(&mut s, ":set @slope 1");
+    assert!(refuses(&mut s, ":redo").contains("nothing to redo"), "a change ends it");
+}
+
+#[test]
+fn inference_says_how_far_it_is_and_what_it_found() {
+    let mut s = line();
+    let said = says(&mut s, ":infer drift(one($continuous)) 200");
+    let head = said.lines().nth(1).unwrap();
+    assert_eq!(head.split_whitespace().collect::<Vec<_>>(), ["quantity", "mean", "sd", "5%", "95%", "ess"]);
+    assert!(said.lines().any(|l| l.starts_with("slope ")) && said.contains("log joint "), "{said}");
+    // A warm-up without end: there are no draws, and both say why.
+    says(&mut s, ":infer { warmup 1000000000 { drift(@slope); } repeat 5 { drift(@slope); } } &");
+    let status = |s: &mut Session| loop {
+        let said = says(s, ":status");
+        if said.contains("warm-up") {
+            return said;
+        }
+    };
+    let said = status(&mut s);
+    assert!(said.contains("warm-up, ") && said.contains(" of 1000000000"), "{said}");
+    let said = refuses(&mut s, ":plot slope");
+    assert!(said.contains("run 2 has no draws yet: warm-up, "), "{said}");
+    says(&mut s, ":drop");
+    // By steps.
+    says(&mut s, ":infer drift(one($continuous)) 1000000000 &");
+    while !says(&mut s, ":status").contains("draws") {
+        std::thread::sleep(Duration::from_millis(5));
+    }
+    let said = says(&mut s, ":plot slope");
+    assert!(said.starts_with("run 3: sampling, ") && said.contains(" of 1000000000\nslope: "), "{said}");
+    says(&mut s, ":drop");
+}
+
+#[test]
+fn help_knows_statements_kernels_and_subjects() {
+    let mut s = line();
+    for (text, what) in [
+        (":doc observe", "observe d = v as name;"),
+        (":help observe", "Condition on"),
+        (":doc infer", "The inference plan"),
+        (":doc infer", ":infer [PLAN] [N] [&]"),
+        (":help flip", "flip(p"),
+        (":help flip", ":flip SEL"),
+        (":doc :flip", ":flip SEL"),
+        (":doc mh", "mh("),
+        (":doc warmup", "step sizes adapt"),
+        (":help logistic", "expit(x)"),
+    ] {
+        let said = says(&mut s, text);
+        assert!(said.contains(what), "{text}: {said}");
+    }
+    assert!(refuses(&mut s, ":doc obsrve").contains("did you mean `observe`?"));
+}
+
+#[test]
+fn a_front_end_is_asked_for_what_a_session_cannot_do() {
+    use pcadlang::session::Request;
+    let folder = std::env::temp_dir().join(format!("pcadlang-asks-{}", std::process::id()));
+    std::fs::create_dir_all(folder.join("run")).unwrap();
+    let at = |name: &str| folder.join(name).display().to_string();
+    std::fs::write(at("other.pcad"), "assume theirs ~ normal(0, 1);").unwrap();
+    let mut s = line();
+    let asked = |s: &mut Session, text: &str| s.enter(text).unwrap_or_else(|e| panic!("{e}")).request;
+    let Some(Request::Confirm { question, then }) = asked(&mut s, &format!(":save {}", at("other"))) else {
+        panic!("a file of somebody else is overwritten")
+    };
+    assert!(question.contains("other.pcad exists"), "{question}");
+    assert_eq!(std::fs::read_to_string(at("other.pcad")).unwrap(), "assume theirs ~ normal(0, 1);");
+    assert_eq!(asked(&mut s, &then), None);
+    assert!(std::fs::read_to_string(at("other.pcad")).unwrap().contains("slope"));
+    // What it wrote itself it writes again.
+    assert_eq!(asked(&mut s, &format!(":save {}", at("other"))), None);
+    std::fs::write(folder.join("run/run.json"), "{}").unwrap();
+    assert_eq!(asked(&mut s, &format!(":load {}", at("run"))), Some(Request::Open(folder.join("run"))));
+    std::fs::remove_dir_all(&folder).unwrap();
+
+    // An edited text replaces the program; choices stay.
+    assert_eq!(asked(&mut s, ":edit"), Some(Request::Edit));
+    says(&mut s, ":set slope 1.5");
+    let before = state(&s);
+    let text = s.text().replace("normal(0, 5) #line", "normal(0, 9) #line");
+    assert!(s.replace(&text).unwrap_or_else(|e| panic!("{e}")).text.contains("log joint"));
+    assert!(s.text().contains("normal(0, 9)") && says(&mut s, "slope") == "1.5\n");
+    assert!(s.replace("assume = ;").is_err() && s.text() == text);
+    says(&mut s, ":undo");
+    assert_eq!(state(&s), before);
+    // Another session's state is taken over.
+    let mut other = session("assume b ~ normal(0, 1);");
+    says(&mut other, ":set b 0.5");
+    s.take_over(other, ":load b");
+    assert_eq!(says(&mut s, "b"), "0.5\n");
+    says(&mut s, ":undo");
+    assert_eq!(state(&s), before);
 }
 
 /// Values without bounds on paper are a line on the screen, and what cannot be built is an error.
@@ -417,6 +602,19 @@ fn words_are_completed_where_they_stand() {
     };
     let has = |s: &Session, line: &str, word: &str| words(s, line).1.iter().any(|w| w == word);
     assert_eq!(words(&s, ":fl"), (":fl".into(), vec![":flip".into()]));
+    // Only what the command takes.
+    for line in [":list ", ":status ", ":undo ", ":quit x"] {
+        assert!(words(&s, line).1.is_empty(), "{line}");
+    }
+    assert_eq!(words(&s, ":why xs").1, ["xs[0]", "xs[1]", "xs[2]"]);
+    assert!(
+        !has(&s, ":flip ", "let")
+            && !has(&s, ":flip ", "exp")
+            && has(&s, ":flip ", "one")
+            && has(&s, ":flip ", "$fast")
+    );
+    assert!(has(&s, ":set xs[0] ex", "exp") && !has(&s, ":set ", "exp") && !has(&s, ":why ", "exp"));
+    assert!(has(&s, ":help obs", "observe") && has(&s, ":doc :fl", ":flip") && has(&s, ":doc m", "mh"));
     assert_eq!(words(&s, ":flip @xs[").1, ["@xs[0]", "@xs[1]", "@xs[2]"]);
     assert_eq!(words(&s, "force @se").1, ["@seen"]);
     assert_eq!(words(&s, ":trace $fa").1, ["$fast"]);

@@ -30,7 +30,20 @@ pub fn aligned(rows: &[Vec<String>]) -> String {
 
 /// Mean, spread, 90 % interval, effective sample size (and that of a second of the kernels' time) and R-hat of each quantity.
 pub fn quantities(quantities: &[Quantity], kernel_seconds: f64) -> String {
-    let mut rows = vec![["quantity", "mean", "sd", "5%", "95%", "ess", "ess/s", "r_hat"].map(str::to_owned).to_vec()];
+    summaries(quantities, Some(kernel_seconds))
+}
+
+/// The same of a single chain: without R-hat, and without times.
+pub fn means(quantities: &[Quantity]) -> String {
+    summaries(quantities, None)
+}
+
+fn summaries(quantities: &[Quantity], seconds: Option<f64>) -> String {
+    let row = |cells: [String; 6], last: [String; 2]| {
+        cells.into_iter().chain(seconds.map(|_| last).into_iter().flatten()).collect::<Vec<_>>()
+    };
+    let heads = ["quantity", "mean", "sd", "5%", "95%", "ess"].map(str::to_owned);
+    let mut rows = vec![row(heads, ["ess/s", "r_hat"].map(str::to_owned))];
     let mut left_out = 0;
     let mut run = (None, 0);
     for q in quantities {
@@ -41,13 +54,14 @@ pub fn quantities(quantities: &[Quantity], kernel_seconds: f64) -> String {
         }
         let s = &q.summary;
         let ess = if s.ess_bulk.is_nan() { "-".into() } else { format!("{:.0}", s.ess_bulk) };
-        let r_hat = super::r_hat_text(s.r_hat);
-        let rate = per_second(s.ess_bulk, kernel_seconds).map_or("-".into(), whole);
-        rows.push(vec![q.name.clone(), number(s.mean), number(s.sd), number(s.q05), number(s.q95), ess, rate, r_hat]);
+        let cells = [q.name.clone(), number(s.mean), number(s.sd), number(s.q05), number(s.q95), ess];
+        let rate = seconds.and_then(|t| per_second(s.ess_bulk, t)).map_or("-".into(), whole);
+        rows.push(row(cells, [rate, super::r_hat_text(s.r_hat)]));
     }
     let mut text = aligned(&narrowed(rows));
     if left_out > 0 {
-        let _ = writeln!(text, "… and {left_out} more elements of vectors, in summary.json");
+        let place = if seconds.is_some() { ", in summary.json" } else { "" };
+        let _ = writeln!(text, "… and {left_out} more elements of vectors{place}");
     }
     text
 }

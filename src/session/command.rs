@@ -1,8 +1,9 @@
 //! The commands: what may follow a colon.
 
-use super::{Reply, Session, Trouble};
+use super::{Reply, Request, Session, Trouble};
 use crate::diag::nearest;
-use crate::lang::builtins::doc;
+use crate::lang::builtins::search::search;
+use crate::lang::builtins::{Builtin, Table, doc};
 
 /// A command, as `:help` has it.
 #[derive(Clone, Copy, Debug)]
@@ -27,6 +28,7 @@ pub const COMMANDS: &[Command] = &[
     command("set", "NAME VALUE", "Give a param, a choice or an observation another value"),
     command("draw", "", "Draw everything anew from the prior"),
     command("undo", "", "Go back to before the last change"),
+    command("redo", "", "Do again what was undone last"),
     command(
         "infer",
         "[PLAN] [N] [&]",
@@ -40,11 +42,17 @@ pub const COMMANDS: &[Command] = &[
     command("profile", "", "Times and acceptance of the last inference, by kernel and choice"),
     command("render", "[NAME] [FILE]", "The picture of the scene, or of a view or solid; into a file that is named"),
     command("list", "", "The program"),
-    command("save", "NAME", "Write the program to NAME.pcad and the trace to NAME.trace.json"),
-    command("load", "NAME", "Load a program, and its trace if there is one"),
-    command("doc", "[NAME]", "Explain a built-in or command"),
-    command("clear", "", "An empty screen"),
-    command("help", "", "This list (also ? or help)"),
+    command("edit", "", "Edit the program in your editor ($VISUAL or $EDITOR)"),
+    command(
+        "save",
+        "NAME",
+        "Write the program to NAME.pcad and the trace to NAME.trace.json; asks before it overwrites",
+    ),
+    command("save!", "NAME", "The same without asking"),
+    command("load", "NAME", "Load a program, and its trace if there is one, or the folder of a run"),
+    command("doc", "[NAME]", "Explain a statement, built-in, kernel or command"),
+    command("clear", "", "Clear the screen"),
+    command("help", "[NAME]", "This list (also ? or help); with a name the same as :doc"),
     command("quit", "", "Leave (also exit, or Ctrl-D)"),
 ];
 
@@ -78,6 +86,7 @@ impl Session {
             "set" => self.set(rest),
             "draw" => self.draw(),
             "undo" => self.undo(),
+            "redo" => self.redo(),
             "infer" => self.infer(rest),
             "status" => Ok(self.status()),
             "wait" => self.wait(),
@@ -87,10 +96,13 @@ impl Session {
             "profile" => self.profile(),
             "render" => self.render(rest),
             "list" => Ok(self.list()),
-            "save" => self.save(rest),
+            "edit" => Ok(Reply::request(Request::Edit)),
+            "save" => self.save(rest, false),
+            "save!" => self.save(rest, true),
             "load" => self.load(rest),
             "doc" => self.doc(rest),
-            "help" | "h" | "?" => Ok(Reply::text(help())),
+            "help" | "h" | "?" if rest.is_empty() => Ok(Reply::text(help())),
+            "help" | "h" | "?" => self.doc(rest),
             "clear" => Ok(Reply { clears: true, ..Reply::default() }),
             "quit" | "q" | "exit" => Ok(Reply { ends: true, ..Reply::default() }),
             _ => {
@@ -111,22 +123,45 @@ impl Session {
 
     fn doc(&self, name: &str) -> Result<Reply, Trouble> {
         if name.is_empty() {
-            return Ok(Reply::text("`:doc NAME` explains a built-in such as `normal`, Tab completes names\n"));
+            return Ok(Reply::text("`:doc NAME` explains `observe`, `normal` or `:flip`; Tab completes names\n"));
         }
-        if let Some(c) = name.strip_prefix(':').and_then(|n| COMMANDS.iter().find(|c| c.name == n)) {
-            return Ok(Reply::text(format!(":{} {}\n\n{}.\n", c.name, c.takes, c.doc)));
-        }
-        let table = &self.model.code().builtins;
-        if let Some(text) = doc::doc(table, name) {
+        let command = |c: &Command| format!(":{} {}\n\n{}.\n", c.name, c.takes, c.doc);
+        let named = |n: &str| COMMANDS.iter().find(|c| c.name == n).map(command);
+        if let Some(text) = name.strip_prefix(':').and_then(named) {
             return Ok(Reply::text(text));
         }
-        let names: Vec<String> = table.iter().map(|b| b.full_name()).collect();
-        let trouble = Trouble::plain(format!("there is no built-in `{name}`"));
+        let table = &self.model.code().builtins;
+        let entries: Vec<String> = doc::doc(table, name).into_iter().chain(named(name)).collect();
+        if !entries.is_empty() {
+            return Ok(Reply::text(entries.join("\n")));
+        }
+        if let Some(text) = about(table, name) {
+            return Ok(Reply::text(text));
+        }
+        let names: Vec<String> = self.topics().collect();
+        let trouble = Trouble::plain(format!("there is no statement, built-in or command `{name}`"));
         Err(match nearest(name, names.iter().map(String::as_str)) {
             Some(n) => trouble.hint(format!("did you mean `{n}`?")),
-            None => trouble,
+            None => trouble.hint("`:help` lists the commands, `pcadlang doc` all built-ins"),
         })
     }
+}
+
+/// Built-ins that are told where a name is none of them.
+const FOUND: usize = 8;
+
+/// The built-ins that say something about a subject, such as `kernels` or `logistic`.
+fn about(table: &Table, words: &str) -> Option<String> {
+    let found = search(table, words);
+    if found.entries.is_empty() || !found.instead.is_empty() || !found.unknown.is_empty() {
+        return None;
+    }
+    let line = |b: &&Builtin| format!("{}\n    {}\n", b.signature(), b.doc);
+    let more = match found.entries.len() {
+        n if n > FOUND => format!("… and {} more: pcadlang doc --search {words}\n", n - FOUND),
+        _ => String::new(),
+    };
+    Some(found.entries.iter().take(FOUND).map(line).collect::<String>() + &more)
 }
 
 /// What `:help` says.
@@ -134,6 +169,7 @@ fn help() -> String {
     let head = |c: &Command| format!(":{} {}", c.name, c.takes).trim_end().to_owned();
     let width = COMMANDS.iter().map(|c| head(c).chars().count()).max().unwrap_or(0);
     let line = |c: &Command| format!("  {:width$}  {}\n", head(c), c.doc);
-    let intro = "Directives are as in a file; an expression shows its value; @a or $tag shows choices.\n";
+    let intro = "Statements are as in a file; an expression shows its value; @a or $tag shows choices.\n\
+        A name that is bound again is replaced; `forget NAME` takes it out.\n";
     intro.to_owned() + &COMMANDS.iter().map(line).collect::<String>()
 }

@@ -1,9 +1,9 @@
 //! Completion: what a word under the cursor may become, from where it stands.
 
 use super::{COMMANDS, Session};
-use crate::lang::builtins::Kind;
+use crate::lang::builtins::{Kind, Type};
 use crate::lang::code::BlockKind;
-use crate::syntax::{Class, classes};
+use crate::syntax::{Class, STATEMENTS, classes};
 use std::path::Path;
 
 /// What may stand in place of a piece of the line.
@@ -15,12 +15,8 @@ pub struct Completion {
     pub words: Vec<String>,
 }
 
-/// The words of the language.
-const KEYWORDS: &[&str] = &[
-    "assume", "let", "observe", "predict", "factor", "force", "freeze", "forget", "sample", "param", "data", "include",
-    "fn", "kernel", "infer", "report", "export", "for", "if", "else", "and", "or", "not", "true", "false", "warmup",
-    "repeat", "mix", "every", "collect", "propose",
-];
+/// Words of the language that begin no statement.
+const KEYWORDS: &[&str] = &["else", "and", "or", "not", "true", "false"];
 /// The tags that choices have by their distributions.
 const KINDS: &[&str] = &["$continuous", "$discrete", "$finite", "$gaussian"];
 /// What is read from files.
@@ -40,24 +36,53 @@ impl Session {
         self.complete_text(before)
     }
 
-    /// What a command takes.
+    /// What a command takes: nothing else is offered.
     fn complete_argument(&self, command: &str, before: &str) -> Completion {
         let start = before.rfind(char::is_whitespace).map_or(0, |i| i + 1);
         let word = &before[start..];
         let globals = || self.model.code().globals.keys().map(|n| n.to_string());
+        let params = || self.program.interface().params.into_iter().map(|p| p.name);
+        let is_first = before[..start].split_whitespace().count() == 1;
         match command {
-            "save" | "load" => found(start, word, files(word, &[".pcad"])),
+            "save" | "save!" | "load" => found(start, word, files(word, &[".pcad"])),
             "render" => found(start, word, globals().chain(files(word, &[".png"]))),
             "plot" => found(start, word, self.quantity_names().into_iter()),
-            "doc" => found(start, word, self.builtins()),
+            "doc" | "help" if is_first => found(start, word, self.topics()),
+            "why" if is_first => self.complete_choice(before, std::iter::empty()),
+            "set" if is_first => self.complete_choice(before, params()),
+            "flip" | "trace" => self.complete_choice(before, self.selections()),
             "infer" if !before.contains(['(', '{']) => {
                 let kernels = self.model.code().builtins.iter().filter(|b| matches!(b.kind, Kind::Inference));
                 let own = self.model.code().kernels.iter().map(|k| k.name.node.to_string());
                 let plans = self.model.plan_names().map(str::to_owned).collect::<Vec<_>>();
                 found(start, word, kernels.map(|b| b.name.to_string()).chain(own).chain(plans))
             }
-            _ => self.complete_text(before),
+            "infer" | "set" => self.complete_text(before),
+            _ => Completion::default(),
         }
+    }
+
+    /// A choice by its address or, without the `@`, by its name, and some other words.
+    fn complete_choice(&self, before: &str, others: impl Iterator<Item = String>) -> Completion {
+        // Keys of addresses may hold spaces.
+        let start = before.rfind(" @").map_or_else(|| before.rfind(char::is_whitespace), Some).map_or(0, |i| i + 1);
+        let word = &before[start..];
+        let choices = self.trace.choices().into_iter().map(|(a, _, _)| a.to_string());
+        let written = |a: String| if word.starts_with('@') { a } else { a.trim_start_matches('@').to_owned() };
+        found(start, word, choices.map(written).chain(others))
+    }
+
+    /// Tags, and functions that make selections.
+    fn selections(&self) -> impl Iterator<Item = String> {
+        let tags = self.model.code().tags.iter().map(|t| format!("${t}"));
+        let all = self.model.code().builtins.iter().filter(|b| b.returns == Type::Selection);
+        tags.chain(KINDS.iter().map(|k| (*k).to_owned())).chain(all.map(|b| b.full_name()))
+    }
+
+    /// What `:doc` explains: statements, built-ins, commands.
+    pub(super) fn topics(&self) -> impl Iterator<Item = String> {
+        let commands = COMMANDS.iter().flat_map(|c| [c.name.to_owned(), format!(":{}", c.name)]);
+        STATEMENTS.iter().map(|s| s.name.to_owned()).chain(self.builtins()).chain(commands)
     }
 
     /// What an expression or directive may hold.
@@ -94,7 +119,7 @@ impl Session {
         }
         let arguments = enclosing_call(&before[..start]).map(|name| self.arguments(&name)).unwrap_or_default();
         let globals = self.model.code().globals.keys().map(|n| n.replace('/', "."));
-        let keywords = KEYWORDS.iter().map(|k| (*k).to_owned());
+        let keywords = STATEMENTS.iter().map(|s| s.name).chain(KEYWORDS.iter().copied()).map(str::to_owned);
         found(start, word, arguments.into_iter().chain(globals).chain(self.builtins()).chain(keywords))
     }
 

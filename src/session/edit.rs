@@ -1,23 +1,29 @@
 //! Directives: the program grows by them, and the trace is made again with the choices that it had.
 
+use super::redefine::{Key, Space, forgotten, items, key, to_forget, users, with_item, without_item};
 use super::{INPUT, Reply, Session, Trouble, exported, exported_operand, shown};
 use crate::diag::SourceMap;
-use crate::lang::code::Operand;
+use crate::lang::code::{BlockKind, Operand};
 use crate::lang::load::reason;
 use crate::lang::value::Value;
 use crate::model::{Model, Program};
 use crate::report::write_file;
 use crate::syntax::ast::{ExprKind, Item, ItemKind, Stmt, StmtKind};
 use crate::syntax::{parse, print_expr};
-use crate::trace::Trace;
+use crate::trace::{Address, Trace};
 use std::path::Path;
 use std::sync::Arc;
+
+/// Names that use another, as far as they are told.
+const MOST_USERS: usize = 8;
 
 /// What a text that was typed holds.
 #[derive(Default)]
 struct Entry {
     /// What becomes part of the program.
     kept: String,
+    /// The same, item by item, with the names that they bind.
+    items: Vec<(Option<Key>, String)>,
     /// Names to show afterwards.
     names: Vec<Arc<str>>,
     /// Expressions of `sample` to evaluate.
@@ -29,12 +35,21 @@ struct Entry {
 impl Session {
     /// Adds directives to the program, runs inference blocks among them, and says what came of it.
     pub(super) fn add(&mut self, text: &str) -> Result<Reply, Trouble> {
-        let entry = read(text);
+        if let Some(name) = forgotten(text) {
+            return self.forget(name);
+        }
+        let mut entry = read(text);
         let past = self.remember(&first_line(text));
         let before = self.trace.log_joint();
         let mut said = String::new();
         let known = (self.model.reports().len(), self.model.exports().len());
-        if !entry.kept.is_empty() {
+        let known_names = items(self.text());
+        let is_known = |k: &Key| known_names.iter().any(|(n, _)| n.as_ref() == Some(k));
+        let again: Vec<Key> = entry.items.iter().filter_map(|(k, _)| k.clone()).filter(|k| is_known(k)).collect();
+        if !again.is_empty() {
+            said += &self.redefine(&mut entry, &again)?;
+            self.keep(past);
+        } else if !entry.kept.is_empty() {
             let grown = grown(self.text(), &entry.kept);
             said += &self.rewrite(self.program.edited(&grown)?)?;
             self.keep(past);
@@ -52,6 +67,101 @@ impl Session {
             said += &self.summary();
         }
         Ok(Reply::text(said))
+    }
+
+    /// Adds items of which some bind names that the program has: these take the place of the old ones, in the text and for all
+    /// that uses them. Says what that is; its values are shown, too.
+    fn redefine(&mut self, entry: &mut Entry, again: &[Key]) -> Result<String, Trouble> {
+        let text = |moved: bool| {
+            entry.items.iter().fold(self.text().to_owned(), |text, (name, item)| {
+                let Some(name) = name.as_ref().filter(|k| again.contains(k)) else { return grown(&text, item) };
+                match moved {
+                    false => with_item(&text, name, item),
+                    true => without_item(&text, name).map(|text| grown(&text, item)),
+                }
+                .unwrap_or_else(|| grown(&text, item))
+            })
+        };
+        let (in_place, moved) = (text(false), text(true));
+        let impossible = self.trace.log_joint() == f64::NEG_INFINITY;
+        // Where the new one needs what was bound since, it can only stand after that.
+        let (mut said, new) = match self.rewrite(self.program.edited(&in_place)?) {
+            Ok(said) => (said, in_place),
+            Err(first) => match self.program.edited(&moved).map_err(Trouble::from).and_then(|p| self.rewrite(p)) {
+                Ok(said) => (said, moved),
+                Err(_) => return Err(first),
+            },
+        };
+        if self.trace.log_joint() == f64::NEG_INFINITY && !impossible {
+            // What it was is not possible any more.
+            said = self.redraw(again)?.unwrap_or(said);
+        }
+        for (_, name) in again {
+            let users = users(&new, name);
+            let shown: Vec<String> = users.iter().take(MOST_USERS).map(|(_, n)| format!("`{n}`")).collect();
+            let more = if users.len() > MOST_USERS { ", …" } else { "" };
+            said += &match shown.is_empty() {
+                true => format!("`{name}` is replaced\n"),
+                false => format!("`{name}` is replaced; used by {}{more}\n", shown.join(", ")),
+            };
+            let values = users.iter().filter(|(space, _)| *space == Space::Value).map(|(_, n)| Arc::clone(n));
+            for n in values.take(MOST_USERS) {
+                if !entry.names.contains(&n) {
+                    entry.names.push(n);
+                }
+            }
+        }
+        let code = Arc::clone(self.model.code());
+        let is_fn =
+            |n: &Arc<str>| code.blocks.iter().any(|b| matches!(&b.kind, BlockKind::Function { name, .. } if name == n));
+        entry.names.retain(|n| !is_fn(n));
+        Ok(said)
+    }
+
+    /// Draws the choices below some names anew; what is to be said of that, unless it leads nowhere either.
+    fn redraw(&mut self, names: &[Key]) -> Result<Option<String>, Trouble> {
+        let below = |a: &Address| names.iter().any(|(_, n)| a.segments.first().is_some_and(|s| s.name == *n));
+        let gone: Vec<u64> = self.trace.choices().iter().filter(|(a, ..)| below(a)).map(|(a, ..)| a.hash64()).collect();
+        let kept: Vec<_> = self.trace.constraints().into_iter().filter(|(h, _)| !gone.contains(h)).collect();
+        let (trace, _) = self.settle(&self.model, &kept, self.trace.replacements())?;
+        if trace.log_joint() == f64::NEG_INFINITY {
+            return Ok(None);
+        }
+        self.trace = trace;
+        Ok(Some(String::new()))
+    }
+
+    /// `forget name`: takes an item out of the program.
+    fn forget(&mut self, name: &str) -> Result<Reply, Trouble> {
+        let key = to_forget(self.text(), name)?;
+        let Some(text) = without_item(self.text(), &key) else { return Err(Trouble::plain("there is no such item")) };
+        let past = self.remember(&format!("forget {name}"));
+        let said = match self.program.edited(&text).map_err(Trouble::from).and_then(|p| self.rewrite(p)) {
+            Ok(said) => said,
+            Err(e) => {
+                let users = users(self.text(), name);
+                let Some((_, first)) = users.first().filter(|_| key.0 != Space::Label) else { return Err(e) };
+                let hint = format!("forget `{first}` first, or bind `{name}` again to replace it");
+                return Err(Trouble::plain(format!("`{first}` uses `{name}`")).hint(hint));
+            }
+        };
+        self.keep(past);
+        Ok(Reply::text(format!("{said}{}", self.summary())))
+    }
+
+    /// Another text for the whole program, from an editor.
+    ///
+    /// # Errors
+    /// What is wrong with it; everything is then as it was.
+    pub fn replace(&mut self, text: &str) -> Result<Reply, Trouble> {
+        if text == self.text() {
+            return Ok(Reply::text("the program is unchanged\n"));
+        }
+        self.clock += 1;
+        let past = self.remember(":edit");
+        let said = self.rewrite(self.program.edited(text)?)?;
+        self.keep(past);
+        Ok(Reply::text(said + &self.summary()))
     }
 
     /// Goes over to another version of the program, with the choices that it shares with this one; gives what is to be said.
@@ -189,6 +299,7 @@ fn read(text: &str) -> Entry {
                     entry.plans.push((Some(Arc::clone(&name.node)), slice.to_owned()));
                 }
                 entry.names.extend(bound(item));
+                entry.items.push((key(item), slice.to_owned()));
                 entry.kept += slice;
                 entry.kept += "\n";
             }

@@ -1,6 +1,6 @@
 //! `:save` and `:load`: the program as a `.pcad` file, the trace beside it.
 
-use super::{Reply, Session, Trouble};
+use super::{Reply, Request, Session, Trouble};
 use crate::lang::load::reason;
 use crate::report::write_file;
 use crate::trace::{SavedTrace, Trace};
@@ -19,10 +19,15 @@ impl Session {
         Ok(Reply::text(self.summary()))
     }
 
-    /// `:save NAME`.
-    pub(super) fn save(&mut self, name: &str) -> Result<Reply, Trouble> {
+    /// `:save NAME`; asks before it overwrites files that this session neither wrote nor loaded, unless it was told to.
+    pub(super) fn save(&mut self, name: &str, overwrites: bool) -> Result<Reply, Trouble> {
         let name = bare(name);
         let (program, trace) = (format!("{name}.pcad"), format!("{name}.trace.json"));
+        let there = [&program, &trace].into_iter().find(|f| Path::new(f).exists() && !self.own_files.contains(*f));
+        if let Some(file) = there.filter(|_| !overwrites) {
+            let question = format!("{file} exists; overwrite it?");
+            return Ok(Reply::request(Request::Confirm { question, then: format!(":save! {name}") }));
+        }
         let written = self.program.written_as(&program).map_err(|e| {
             let first = e.diagnostics.first().map_or_else(String::new, |d| d.message.clone());
             Trouble::plain(format!("{program} would not load: {first}"))
@@ -35,11 +40,17 @@ impl Session {
             write_file(Path::new(path), bytes)
                 .map_err(|e| Trouble::plain(format!("cannot write {path}: {}", reason(&e))))?;
         }
-        Ok(Reply::text(format!("{program}, {trace}\n")))
+        let said = format!("{program}, {trace}\n");
+        self.own_files.extend([program, trace]);
+        Ok(Reply::text(said))
     }
 
     /// `:load NAME`.
     pub(super) fn load(&mut self, name: &str) -> Result<Reply, Trouble> {
+        let folder = Path::new(name.trim_matches('"'));
+        if folder.join("run.json").is_file() {
+            return Ok(Reply::request(Request::Open(folder.to_owned())));
+        }
         let path = format!("{}.trace.json", bare(name));
         let program = self.program.replaced(&format!("{}.pcad", bare(name)))?;
         let (loaded, note) = Session::open(program, self.seed, self.limits.stop.clone())?;
@@ -54,6 +65,7 @@ impl Session {
         }
         (self.program, self.model, self.trace) = (loaded.program, loaded.model, trace);
         self.keep(past);
+        self.own_files.extend([format!("{}.pcad", bare(name)), path]);
         Ok(Reply::text(said + &self.summary()))
     }
 }

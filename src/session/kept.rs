@@ -22,6 +22,8 @@ pub(super) struct Seen {
     /// Draws that are another state than the one before, as far as the log joint density tells.
     pub moved: u64,
     pub best: Option<f64>,
+    /// The step after which the last draw was recorded, warm-up not counted.
+    pub last_step: u64,
     last: Option<f64>,
 }
 
@@ -51,6 +53,7 @@ impl Sink for Kept {
     fn draw(&mut self, row: &DrawRow) -> io::Result<()> {
         let mut seen = self.seen.lock().unwrap_or_else(PoisonError::into_inner);
         seen.draws += 1;
+        seen.last_step = row.step;
         seen.moved += u64::from(seen.last.is_none_or(|l| l.to_bits() != row.log_joint.to_bits()));
         seen.last = Some(row.log_joint);
         seen.best = Some(seen.best.map_or(row.log_joint, |b| b.max(row.log_joint)));

@@ -15,6 +15,7 @@ mod kept;
 mod look;
 mod picture;
 mod plot;
+mod redefine;
 mod reply;
 mod run;
 mod shown;
@@ -24,7 +25,7 @@ pub use command::{COMMANDS, Command};
 pub use complete::Completion;
 pub use export::{exported, exported_operand};
 pub use picture::{Picture, detected, drawn, over, strokes};
-pub use reply::{Reply, Trouble};
+pub use reply::{Reply, Request, Trouble};
 pub use run::Status;
 pub use shown::short;
 
@@ -33,7 +34,7 @@ use crate::model::{Error, Model, Program};
 use crate::rng::{Purpose, StreamKey};
 use crate::trace::{Constraint, Draws, Limits, Stop, Trace};
 use run::{Background, Finished};
-use std::collections::VecDeque;
+use std::collections::{BTreeSet, VecDeque};
 use std::sync::Arc;
 use std::time::Duration;
 
@@ -59,6 +60,10 @@ pub struct Session {
     model: Arc<Model>,
     trace: Trace,
     past: VecDeque<Past>,
+    /// What was undone since the last change, the last one at the end.
+    undone: Vec<Past>,
+    /// Files that this session wrote or loaded: these may be written again without a question.
+    own_files: BTreeSet<String>,
     /// Counts what was entered: random streams are keyed by it.
     clock: u64,
     /// Chains of inference so far.
@@ -113,6 +118,8 @@ impl Session {
             model,
             trace,
             past: VecDeque::new(),
+            undone: Vec::new(),
+            own_files: BTreeSet::new(),
             clock: 0,
             chains: 0,
             background: None,
@@ -235,8 +242,14 @@ impl Session {
         }
     }
 
-    /// Keeps a past, and forgets the oldest where they are too many.
+    /// Keeps a past: what was undone before it cannot be done again.
     fn keep(&mut self, past: Past) {
+        self.undone.clear();
+        self.push(past);
+    }
+
+    /// Adds a past, and forgets the oldest where they are too many.
+    fn push(&mut self, past: Past) {
         self.past.push_back(past);
         let size = |p: &Past| p.choices.len() + 100;
         let mut all: usize = self.past.iter().map(size).sum();
@@ -256,11 +269,33 @@ impl Session {
     /// `:undo`.
     fn undo(&mut self) -> Result<Reply, Trouble> {
         let Some(past) = self.past.pop_back() else { return Err(Trouble::plain("there is nothing to undo")) };
+        let now = self.remember(&past.what);
         if let Err(e) = self.go_back(&past) {
             self.past.push_back(past);
             return Err(e);
         }
+        self.undone.push(now);
         Ok(Reply::text(format!("undone: {}\n{}", past.what, self.summary())))
+    }
+
+    /// `:redo`.
+    fn redo(&mut self) -> Result<Reply, Trouble> {
+        let Some(next) = self.undone.pop() else { return Err(Trouble::plain("there is nothing to redo")) };
+        let now = self.remember(&next.what);
+        if let Err(e) = self.go_back(&next) {
+            self.undone.push(next);
+            return Err(e);
+        }
+        self.push(now);
+        Ok(Reply::text(format!("redone: {}\n{}", next.what, self.summary())))
+    }
+
+    /// Goes on with the program and state of another session; `:undo` goes back.
+    pub fn take_over(&mut self, other: Session, what: &str) -> Reply {
+        let past = self.remember(what);
+        (self.program, self.model, self.trace) = (other.program, other.model, other.trace);
+        self.keep(past);
+        Reply::text(self.summary())
     }
 
     /// The log joint density in a line.

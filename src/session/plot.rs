@@ -17,10 +17,10 @@ const BELOW: [char; 8] = ['▁', '▂', '▃', '▄', '▅', '▆', '▇', '█'
 impl Session {
     /// `:plot x`.
     pub(super) fn plot(&self, name: &str) -> Result<Reply, Trouble> {
-        let Some(draws) = self.latest_draws() else { return Err(Trouble::plain("nothing has run yet").hint(":infer")) };
+        let (said, draws) = self.latest_draws()?;
         let all = quantities(&[draws]);
         if let Some(q) = all.iter().find(|q| q.name == name) {
-            return Ok(Reply::text(plotted(q)));
+            return Ok(Reply::text(said + &plotted(q)));
         }
         let names = all.iter().map(|q| q.name.as_str());
         let trouble = Trouble::plain(format!("the last inference has no quantity `{name}`"));
@@ -32,7 +32,7 @@ impl Session {
 
     /// The quantities of the last inference.
     pub(super) fn quantity_names(&self) -> Vec<String> {
-        let all = self.latest_draws().map(|d| quantities(&[d])).unwrap_or_default();
+        let all = self.latest_draws().map(|(_, d)| quantities(&[d])).unwrap_or_default();
         all.into_iter().map(|q| q.name).collect()
     }
 }

@@ -5,6 +5,7 @@ use crate::lang::error::RunError;
 use crate::model::{Error, Model};
 use crate::syntax::span::Span;
 use std::fmt;
+use std::path::PathBuf;
 
 /// What was done.
 #[derive(Debug, Default)]
@@ -13,13 +14,36 @@ pub struct Reply {
     pub text: String,
     /// A picture to show, after the text.
     pub picture: Option<Picture>,
+    /// What the front end is asked to do.
+    pub request: Option<Request>,
     /// Whether the screen is to be empty first.
     pub clears: bool,
     /// Whether the user wants to leave.
     pub ends: bool,
 }
 
+/// What a session cannot do by itself: it knows no terminal, editor or command line.
+#[derive(Clone, Debug, PartialEq, Eq)]
+pub enum Request {
+    /// Ask the user a question; where the answer is yes, enter this.
+    Confirm {
+        /// The question.
+        question: String,
+        /// What to enter then.
+        then: String,
+    },
+    /// Let the user edit the program's text, and give it to [`Session::replace`](super::Session::replace).
+    Edit,
+    /// Open a run's folder, and give the session of that to [`Session::take_over`](super::Session::take_over).
+    Open(PathBuf),
+}
+
 impl Reply {
+    /// A request to the front end.
+    pub(super) fn request(request: Request) -> Reply {
+        Reply { request: Some(request), ..Reply::default() }
+    }
+
     /// A text.
     pub fn text(text: impl Into<String>) -> Reply {
         Reply { text: text.into(), ..Reply::default() }
@@ -67,7 +91,7 @@ impl fmt::Display for Trouble {
             Trouble::Program(e) => f.write_str(e.to_string().trim_end()),
             Trouble::Plain(message, None) => write!(f, "error: {message}"),
             Trouble::Plain(message, Some(hint)) => write!(f, "error: {message}\n  = hint: {hint}"),
-            Trouble::Stopped => f.write_str("stopped; everything is as it was"),
+            Trouble::Stopped => f.write_str("stopped; nothing has changed"),
         }
     }
 }

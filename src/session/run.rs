@@ -10,12 +10,12 @@ use crate::infer::draws::{KernelStats, SiteStats};
 use crate::infer::{ChainError, ChainResult, Progress, RunOptions, run_from};
 use crate::model::{Model, Program};
 use crate::platform::clock::Instant;
-use crate::report::{ChainDraws, number, seconds, table};
+use crate::report::{ChainDraws, number, quantities, seconds, table};
 use crate::syntax::ast::KStmt;
 use crate::trace::{Limits, Stop};
 use std::path::Path;
 use std::sync::Arc;
-use std::sync::atomic::{AtomicBool, Ordering};
+use std::sync::atomic::{AtomicBool, AtomicU64, Ordering};
 use std::sync::mpsc::{Receiver, RecvTimeoutError, channel};
 use std::thread::JoinHandle;
 use std::time::Duration;
@@ -35,6 +35,8 @@ pub(super) struct Background {
     /// The model it runs; another one where the plan was typed.
     model: Arc<Model>,
     progress: Arc<Progress>,
+    /// Steps after which it ends, where that was said.
+    steps: Option<u64>,
     kept: Kept,
     began: Instant,
     /// Told when it is over, and whether it is.
@@ -66,6 +68,10 @@ pub struct Status {
     pub best: Option<f64>,
     /// Time so far.
     pub elapsed: Duration,
+    /// What it does: looking for a start, warm-up, sampling.
+    pub phase: &'static str,
+    /// How much of that is done, and of how much: steps where their number was given, else passes of the plan's loop.
+    pub done: (u64, u64),
     /// Whether it has ended.
     pub is_done: bool,
 }
@@ -144,25 +150,30 @@ impl Session {
             return Err(trouble.hint("`:wait` for it, `:stop` it, or `:drop` it first"));
         }
         let note = job.note.clone();
-        let stop = if in_background { Stop::default() } else { self.limits.stop.clone() };
-        let run = self.begin(job, stop.clone())?;
+        let run = self.begin(job)?;
         if in_background {
             let text = format!("{note}run {} in the background: {}\n", run.number, run.what);
             self.background = Some(run);
             return Ok(Reply::text(text));
         }
-        self.wait_for(&run, &stop, true)?;
-        let said = self.adopt(run)?;
-        Ok(Reply::text(note + &said))
+        let stop = self.limits.stop.clone();
+        let stopped = !self.wait_for(&run, &stop, true)?;
+        // The state that it came to is taken over although a stop was asked for: the question is answered.
+        self.limits.stop = Stop::default();
+        let adopted = self.adopt(run);
+        self.limits.stop = stop;
+        self.trace.set_limits(self.limits.clone());
+        let ended = if stopped { "stopped early; its draws are kept, and `:undo` goes back\n" } else { "" };
+        Ok(Reply::text(format!("{note}{}{ended}", adopted?)))
     }
 
     /// Starts a chain on a clone of the trace.
-    fn begin(&mut self, job: Job, stop: Stop) -> Result<Background, Trouble> {
+    fn begin(&mut self, job: Job) -> Result<Background, Trouble> {
         let mut trace = match Arc::ptr_eq(&job.model, &self.model) {
             true => self.trace.clone(),
             false => self.moved_to(&job.model, &self.trace)?,
         };
-        let limits = Limits { stop, ..self.limits.clone() };
+        let limits = Limits { stop: Stop::default(), ..self.limits.clone() };
         trace.set_limits(limits.clone());
         self.chains += 1;
         let number = self.chains;
@@ -192,12 +203,13 @@ impl Session {
         };
         let thread = thread.map_err(|e| Trouble::plain(format!("no thread can be started: {e}")))?;
         let base = Arc::clone(&self.model);
-        let (what, model, began) = (job.what, job.model, Instant::now());
-        Ok(Background { what, number, base, model, progress, kept, began, done, is_done, thread })
+        let (what, model, steps, began) = (job.what, job.model, job.steps, Instant::now());
+        Ok(Background { what, number, base, model, progress, steps, kept, began, done, is_done, thread })
     }
 
-    /// Waits until a run is over, or until that is stopped from outside; `ends` says whether the run ends then.
-    fn wait_for(&mut self, run: &Background, stop: &Stop, ends: bool) -> Result<(), Trouble> {
+    /// Waits until a run is over, or until that is stopped from outside; `ends` says whether the run ends then, which is waited
+    /// for. True if nobody stopped it.
+    fn wait_for(&mut self, run: &Background, stop: &Stop, ends: bool) -> Result<bool, Trouble> {
         while run.done.recv_timeout(PAUSE) == Err(RecvTimeoutError::Timeout) {
             if stop.is_asked() {
                 if !ends {
@@ -209,7 +221,7 @@ impl Session {
                 watch(&run.status());
             }
         }
-        if ends && stop.is_asked() { Err(Trouble::Stopped) } else { Ok(()) }
+        Ok(!run.progress.cancelled.load(Ordering::Relaxed))
     }
 
     /// Makes the last state of a run that is over the session's.
@@ -239,7 +251,8 @@ impl Session {
         let past = self.remember(&format!("inference by {}", finished.what));
         let before = std::mem::replace(&mut self.trace, last).log_joint();
         self.keep(past);
-        let said = format!("{}log joint {} -> {}\n", finished.line(), number(before), number(self.trace.log_joint()));
+        let (line, means) = (finished.line(), finished.means());
+        let said = format!("{line}{means}log joint {} -> {}\n", number(before), number(self.trace.log_joint()));
         self.last = Some(finished);
         Ok(said)
     }
@@ -259,7 +272,7 @@ impl Session {
         let waited = self.wait_for(&run, &self.limits.stop.clone(), false);
         let said = run.line();
         self.background = Some(run);
-        waited.map(|()| Reply::text(said))
+        waited.map(|_| Reply::text(said))
     }
 
     /// `:stop`.
@@ -290,10 +303,20 @@ impl Session {
         self.background.as_ref().map(|b| (b.number, b.status().is_done))
     }
 
-    /// The draws of the run in the background, or of the last one.
-    pub(super) fn latest_draws(&self) -> Option<ChainDraws> {
-        let running = self.background.as_ref().map(|b| b.kept.draws()).filter(|d| !d.rows.is_empty());
-        running.or_else(|| self.last.as_ref().map(|l| l.draws.clone()))
+    /// The draws of the run in the background, or of the last one, and what is to be said of them.
+    ///
+    /// # Errors
+    /// If there are none: nothing has run, or what runs is still in warm-up.
+    pub(super) fn latest_draws(&self) -> Result<(String, ChainDraws), Trouble> {
+        match (&self.background, &self.last) {
+            (Some(run), _) => match run.kept.draws() {
+                draws if draws.rows.is_empty() => Err(Trouble::plain(run.no_draws().trim_end())),
+                draws if run.status().is_done => Ok((String::new(), draws)),
+                draws => Ok((format!("run {}: {}\n", run.number, run.status().part()), draws)),
+            },
+            (None, Some(last)) => Ok((String::new(), last.draws.clone())),
+            (None, None) => Err(Trouble::plain("nothing has run yet").hint(":infer")),
+        }
     }
 
     /// `:profile`.
@@ -311,6 +334,16 @@ impl Session {
     }
 }
 
+impl Status {
+    /// The phase and how far it is, as "warm-up, 300 of 1000".
+    pub fn part(&self) -> String {
+        match self.done {
+            (_, 0) => self.phase.to_owned(),
+            (done, of) => format!("{}, {done} of {of}", self.phase),
+        }
+    }
+}
+
 impl Background {
     fn status(&self) -> Status {
         let seen = self.kept.seen();
@@ -319,14 +352,41 @@ impl Background {
             draws: seen.draws,
             best: seen.best,
             elapsed: self.began.elapsed(),
+            phase: self.phase(),
+            done: self.part(),
             is_done: self.is_done.load(Ordering::SeqCst),
         }
+    }
+
+    fn phase(&self) -> &'static str {
+        match &self.progress {
+            p if p.started.load(Ordering::Relaxed) == 0 => "starting",
+            p if p.warming.load(Ordering::Relaxed) > 0 => "warm-up",
+            _ => "sampling",
+        }
+    }
+
+    /// How much of the phase is done, and of how much.
+    fn part(&self) -> (u64, u64) {
+        let number = |n: &AtomicU64| n.load(Ordering::Relaxed);
+        match self.steps {
+            Some(steps) if self.phase() == "sampling" => (self.kept.seen().last_step, steps),
+            _ => (number(&self.progress.pass), number(&self.progress.passes)),
+        }
+    }
+
+    /// That it has no draws yet, and why.
+    fn no_draws(&self) -> String {
+        format!("run {} has no draws yet: {}\n", self.number, self.status().part())
     }
 
     /// What is known of it, in a line.
     fn line(&self) -> String {
         let (s, seen) = (self.status(), self.kept.seen());
-        let state = if s.is_done { "done; `:stop` takes over its state" } else { "running" };
+        let state = match s.is_done {
+            true => "done; `:stop` takes over its state".to_owned(),
+            false => s.part(),
+        };
         let mut line = format!("run {}, {}: {} steps", self.number, self.what, s.steps);
         line += &drawn(&seen);
         format!("{line}; {state}\n")
@@ -340,7 +400,25 @@ fn drawn(seen: &Seen) -> String {
     format!(", {} draws ({share:.0}% new states), best log joint {}", seen.draws, number(best))
 }
 
+/// Quantities in the table after inference.
+const MEANS: usize = 12;
+
 impl Finished {
+    /// Means and intervals of what was drawn.
+    fn means(&self) -> String {
+        if self.draws.rows.len() < 2 {
+            return String::new();
+        }
+        let mut all = quantities(std::slice::from_ref(&self.draws));
+        let left_out = all.len().saturating_sub(MEANS);
+        all.truncate(MEANS);
+        let more = match left_out {
+            0 => String::new(),
+            n => format!("… and {n} more: `:plot NAME`\n"),
+        };
+        table::means(&all) + &more
+    }
+
     /// What was done, in a line.
     fn line(&self) -> String {
         let warmup = if self.warmup > 0 { format!(" after {} of warm-up", self.warmup) } else { String::new() };

@@ -18,6 +18,7 @@ mod lexer;
 mod parse;
 mod recover;
 pub mod span;
+mod statements;
 mod string;
 mod token;
 
@@ -28,6 +29,7 @@ pub use error::{AddressError, MAX_ERRORS, SyntaxError, SyntaxErrorKind};
 pub use format::{WIDTH, format, print, print_expr};
 pub use lexer::MAX_TOKENS;
 pub use parse::{parse, parse_expr};
+pub use statements::{Place, STATEMENTS, Statement};
 pub(crate) use token::{is_keyword, is_name};
 
 lalrpop_util::lalrpop_mod!(

@@ -56,6 +56,12 @@ impl Lines {
         Ok(Lines { editor, history })
     }
 
+    /// Whether the user says yes to a question.
+    pub fn is_agreed(&mut self, question: &str) -> bool {
+        let answer = self.editor.readline(&format!("{question} [y/N] "));
+        answer.is_ok_and(|a| matches!(a.trim().to_lowercase().as_str(), "y" | "yes"))
+    }
+
     /// The next entry.
     pub fn next(&mut self, prompt: &str) -> Result<Typed, ReadlineError> {
         match self.editor.readline(prompt) {

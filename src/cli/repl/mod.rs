@@ -1,6 +1,7 @@
 //! `pcadlang repl`: a session at a prompt, or a script that is piped in.
 
 mod blocks;
+mod edit;
 mod editor;
 mod iterm;
 mod kitty;
@@ -14,7 +15,7 @@ use super::reopened::Reopened;
 use super::{Failure, given, has_colors, plain, term};
 use editor::{Lines, Typed, is_whole};
 use pcadlang::report::number;
-use pcadlang::session::{Reply, Session, Status, Trouble};
+use pcadlang::session::{Reply, Request, Session, Status, Trouble};
 use pcadlang::trace::Stop;
 use std::cell::{Cell, RefCell};
 use std::io::{BufRead, IsTerminal, Write};
@@ -43,7 +44,8 @@ pub fn repl(a: &Repl) -> Result<(), Failure> {
         }
     });
     let shown = Rc::new(Cell::new(false));
-    let mut front = Front { session: Rc::new(RefCell::new(session)), graphics: graphics(a), shown, interrupts };
+    let session = Rc::new(RefCell::new(session));
+    let mut front = Front { session, seed: a.seed, graphics: graphics(a), draft: None, shown, interrupts };
     print(&said.text);
     if is_live { front.prompt() } else { front.script(a.transcript) }
 }
@@ -107,7 +109,10 @@ impl From<Trouble> for Failure {
 /// A session and how it is shown.
 struct Front {
     session: Rc<RefCell<Session>>,
+    seed: u64,
     graphics: Graphics,
+    /// A text of the program that was edited and has errors.
+    draft: Option<String>,
     /// Whether there is a line of progress on the terminal.
     shown: Rc<Cell<bool>>,
     interrupts: Arc<Interrupts>,
@@ -142,7 +147,7 @@ impl Front {
                 told = Some(number);
             }
             let leaves = match lines.next(PROMPT).map_err(wrong)? {
-                Typed::Entry(text) => match self.enter(&text) {
+                Typed::Entry(text) => match self.answered(&text, &mut lines) {
                     Ok(leaves) => leaves,
                     Err(Failure::Interrupted) => {
                         error_line!("{}", Trouble::Stopped);
@@ -172,7 +177,14 @@ impl Front {
     fn script(&mut self, transcript: bool) -> Result<(), Failure> {
         let mut lines = std::io::stdin().lock().lines();
         while let Some(entry) = next_entry(&mut lines, transcript)? {
-            match self.enter(&entry) {
+            let done = self.enter(&entry).and_then(|done| match done {
+                Done::Asks { question, then } => {
+                    let what = question.split(';').next().unwrap_or_default().to_owned();
+                    Err(Failure::Plain(what, Some(format!("`{then}` overwrites it"))))
+                }
+                done => Ok(done == Done::Leaves),
+            });
+            match done {
                 Ok(true) => return Ok(()),
                 Ok(false) => {}
                 Err(Failure::Plain(message, hint)) if transcript => {
@@ -186,15 +198,39 @@ impl Front {
         Ok(())
     }
 
-    /// Does an entry and shows what came of it; true if the user leaves.
-    fn enter(&mut self, text: &str) -> Result<bool, Failure> {
+    /// Does an entry, and asks the user what it wants to know.
+    fn answered(&mut self, text: &str, lines: &mut Lines) -> Result<bool, Failure> {
+        match self.enter(text)? {
+            Done::Asks { question, then } => match lines.is_agreed(&question) {
+                true => self.enter(&then).map(|done| done == Done::Leaves),
+                false => {
+                    print_line!("nothing was done");
+                    Ok(false)
+                }
+            },
+            done => Ok(done == Done::Leaves),
+        }
+    }
+
+    /// Does an entry and shows what came of it.
+    fn enter(&mut self, text: &str) -> Result<Done, Failure> {
         self.interrupts.asked.store(false, Ordering::SeqCst);
         self.interrupts.pressed.store(0, Ordering::SeqCst);
         let done = self.session.borrow_mut().enter(text);
         if self.shown.take() {
             error_text!("\r\x1b[K");
         }
-        let reply = done?;
+        let mut reply = done?;
+        match reply.request.take() {
+            None => {}
+            Some(Request::Confirm { question, then }) => return Ok(Done::Asks { question, then }),
+            Some(Request::Edit) => reply = self.edit()?,
+            Some(Request::Open(folder)) => {
+                let seed = self.seed;
+                let (other, _) = reopened(&folder, seed, Stop::when(Arc::clone(&self.interrupts.asked)))?;
+                reply = self.session.borrow_mut().take_over(other, &format!(":load {}", folder.display()));
+            }
+        }
         if reply.clears && std::io::stdout().is_terminal() {
             print("\x1b[2J\x1b[H");
         }
@@ -202,8 +238,34 @@ impl Front {
         if let Some(picture) = &reply.picture {
             print(&pictures::shown(picture, self.graphics)?);
         }
-        Ok(reply.ends)
+        Ok(if reply.ends { Done::Leaves } else { Done::Goes })
     }
+
+    /// Has the program edited; a text with errors is kept for the next time.
+    fn edit(&mut self) -> Result<Reply, Failure> {
+        let text = self.draft.take().unwrap_or_else(|| self.session.borrow().text().to_owned());
+        let edited = edit::edited(&text)?;
+        let replaced = self.session.borrow_mut().replace(&edited);
+        if replaced.is_err() {
+            self.draft = Some(edited);
+        }
+        replaced.map_err(|t| match t {
+            Trouble::Program(e) => Failure::Program(e),
+            t => Failure::from(t.hint("`:edit` goes on with the text as you left it")),
+        })
+    }
+}
+
+/// What an entry led to.
+#[derive(PartialEq, Eq)]
+enum Done {
+    Goes,
+    Leaves,
+    /// A question is open: what to enter if the answer is yes.
+    Asks {
+        question: String,
+        then: String,
+    },
 }
 
 /// The next entry of a script: a line, and those that it goes on in.
@@ -236,5 +298,5 @@ fn print(text: &str) {
 /// The line of progress.
 fn progress(s: &Status) -> String {
     let best = s.best.map_or(String::new(), |b| format!(", best log joint {}", number(b)));
-    format!("{} steps, {} draws{best}, {} s; Ctrl-C ends it", s.steps, s.draws, s.elapsed.as_secs())
+    format!("{}{best}, {} s; Ctrl-C ends it and keeps its draws", s.part(), s.elapsed.as_secs())
 }

@@ -118,6 +118,10 @@ pub struct Progress {
     pub warming: AtomicU32,
     /// Chains that have ended.
     pub ended: AtomicU32,
+    /// Passes of the outermost loop that a chain began last, and how many it is to make.
+    pub pass: AtomicU64,
+    /// See `pass`.
+    pub passes: AtomicU64,
 }
 
 /// What a chain leaves.

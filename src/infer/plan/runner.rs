@@ -22,6 +22,7 @@ use crate::trace::{Constraint, Draws, Limits, Selector, Stop, Trace};
 use rustc_hash::FxHashMap;
 use std::collections::VecDeque;
 use std::sync::Arc;
+use std::sync::atomic::Ordering;
 
 /// How a statement ended.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
@@ -350,6 +351,10 @@ impl<'a> Runner<'a> {
     /// One pass of a loop.
     pub fn pass(&mut self, (i, of, first): (u64, u64, u64), body: &[KStmt]) -> Result<Flow, ChainError> {
         self.note(Doing::Loop { pass: i, of, first });
+        if self.loops == 0 {
+            self.progress.pass.store(i, Ordering::Relaxed);
+            self.progress.passes.store(of, Ordering::Relaxed);
+        }
         if self.way.is_empty() {
             if self.is_over() {
                 self.keep(None)?;

@@ -2,9 +2,10 @@
 
 use super::examples::INCLUDE;
 use super::{Argument, Builtin, Kind, Table, Type};
+use crate::syntax::{Place, STATEMENTS, Statement};
 use std::fmt::Write;
 
-/// The entry of a built-in or constant as plain text: `normal`, `scene.lathe`, or `lathe` where that is clear.
+/// The entry of a built-in, constant or statement as plain text: `normal`, `scene.lathe`, or `lathe` where that is clear, `observe`.
 pub fn doc(table: &Table, name: &str) -> Option<String> {
     if let Some(c) = table.constants().iter().find(|c| c.name == name) {
         return Some(format!("{} = {}\n\n{}\n", c.name, c.value, c.doc));
@@ -14,8 +15,20 @@ pub fn doc(table: &Table, name: &str) -> Option<String> {
         Some(b) => vec![b],
         None => table.iter().filter(|b| b.name == name).collect(),
     };
-    let texts: Vec<String> = entries.into_iter().map(entry).collect();
+    let statement = STATEMENTS.iter().find(|s| s.name == name).map(statement);
+    let texts: Vec<String> = statement.into_iter().chain(entries.into_iter().map(entry)).collect();
     (!texts.is_empty()).then(|| texts.join("\n"))
+}
+
+/// What `doc` says of a statement.
+fn statement(s: &Statement) -> String {
+    let forms: Vec<&str> = s.form.split("   ").collect();
+    let place = match s.place {
+        Place::Model => "",
+        Place::Plan => "It stands in an `infer` block or a kernel.\n\n",
+        Place::Expression => "It is an expression.\n\n",
+    };
+    format!("{}\n\n{}\n\n{place}Example:\n\n  {}\n", forms.join("\n"), s.doc, s.example)
 }
 
 /// What `doc` says of one built-in.
@@ -52,7 +65,12 @@ fn indented(text: &str, by: &str) -> String {
 /// The reference of every built-in, by section, as Markdown.
 pub fn reference(table: &Table) -> String {
     let mut s = String::new();
-    let _ = write!(s, "## Constants\n\n");
+    let _ = write!(s, "## Statements\n\n");
+    for x in STATEMENTS {
+        let forms: Vec<String> = x.form.split("   ").map(|f| format!("`{f}`")).collect();
+        let _ = writeln!(s, "- **{}**. {}", forms.join(", "), x.doc);
+    }
+    let _ = write!(s, "\n## Constants\n\n");
     for c in table.constants() {
         let _ = writeln!(s, "- **`{}`** = {}. {}", c.name, c.value, c.doc);
     }
