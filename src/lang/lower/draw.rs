@@ -83,12 +83,13 @@ impl Lowerer<'_> {
                 .fold(0u32, |bits, i| bits | 1u32.checked_shl((n - 1 - i) as u32).unwrap_or(0))
         };
         let own: Box<[Operand]> = if plain { Box::default() } else { operands.clone().into() };
-        let site = self.site(&name.node, tags, carried);
+        let outside = self.scopes.len() - 1 - up as usize;
+        let occurrence = self.occurrence_of((self.scopes[outside].block, container), &name.node);
+        let site = self.site_of(&name.node, occurrence, tags, carried);
         let slot = self.push(Op::Draw { dist: spec, site, keys: own }, dist.span);
         let written = keys.iter().map(|k| format!("[{}]", print_expr(k))).collect::<String>();
 
         // The loops between the container and the draw.
-        let outside = self.scopes.len() - 1 - up as usize;
         let inner: Vec<usize> = loops.iter().copied().filter(|i| *i > outside).collect();
         let through: Box<[Slot]> = inner
             .iter()
@@ -123,6 +124,19 @@ impl Lowerer<'_> {
         scope.drawn.push((name.node, written, slot));
     }
 
+    /// Which occurrence of its name a container is. `z[0] ~ d; for t in 1 .. n { z[t] ~ e; }` draws `@z[0]`, `@z[1]`, …: that two of
+    /// its elements have one address is found when they are drawn.
+    fn occurrence_of(&mut self, container: (u32, Slot), name: &Arc<str>) -> u32 {
+        if let Some(n) = self.bodies.last().and_then(|b| b.containers.get(&container)) {
+            return *n;
+        }
+        let n = self.next_occurrence(name);
+        if let Some(body) = self.bodies.last_mut() {
+            body.containers.insert(container, n);
+        }
+        n
+    }
+
     /// Declares the containers that statements of this block, and loops in them, draw into.
     pub fn declare_containers(&mut self, stmts: &[Stmt]) {
         if self.in_loop() {
@@ -155,6 +169,7 @@ impl Lowerer<'_> {
                 if self.scopes.len() == 1 {
                     let global = self.global_name(name);
                     self.code.globals.insert(global, Operand::Local(slot));
+                    self.recorded(&name.node, Operand::Local(slot));
                 }
             }
             Some(b) if matches!(b.meaning, Meaning::Container(_)) => {}

@@ -66,6 +66,8 @@ pub(super) struct Body {
     counts: FxHashMap<(Vec<Arc<str>>, Arc<str>), u32>,
     /// Tags of the `assume` around, by index of their name.
     pub tags: Vec<SiteTag>,
+    /// Which occurrence of its name a container is, by block and slot: its elements share it, wherever they are drawn.
+    pub containers: FxHashMap<(u32, Slot), u32>,
 }
 
 /// The top-level names of a file, or of files that share a namespace.
@@ -171,6 +173,20 @@ impl Lowerer<'_> {
 
     /// A site below the present bindings.
     pub fn site(&mut self, name: &Arc<str>, own_tags: Vec<SiteTag>, carried: u32) -> u32 {
+        let occurrence = self.next_occurrence(name);
+        self.site_of(name, occurrence, own_tags, carried)
+    }
+
+    /// How often a name has now occurred below the present bindings.
+    pub fn next_occurrence(&mut self, name: &Arc<str>) -> u32 {
+        let body = self.body();
+        let count = body.counts.entry((body.prefix.clone(), Arc::clone(name))).or_insert(0);
+        *count += 1;
+        *count
+    }
+
+    /// A site below the present bindings, as an occurrence of its name.
+    pub fn site_of(&mut self, name: &Arc<str>, occurrence: u32, own_tags: Vec<SiteTag>, carried: u32) -> u32 {
         let module = self.modules[self.module].prefix.clone();
         if self.bodies.len() == 1
             && let Some(m) = &module
@@ -181,9 +197,6 @@ impl Lowerer<'_> {
         }
         let in_function = self.bodies.len() > 1;
         let body = self.body();
-        let count = body.counts.entry((body.prefix.clone(), Arc::clone(name))).or_insert(0);
-        *count += 1;
-        let occurrence = *count;
         let outer = module.into_iter().filter(|_| !in_function);
         let mut segments: Vec<SiteSegment> =
             outer.chain(body.prefix.iter().cloned()).map(|s| SiteSegment::new(s, 1)).collect();

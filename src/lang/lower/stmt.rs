@@ -30,8 +30,8 @@ impl Lowerer<'_> {
                     }
                 };
                 self.bind_value(name, value);
-                if at_root && self.modules[self.module].prefix.is_none() {
-                    self.code.assumed.push((Arc::clone(&name.node), value.at));
+                if at_root {
+                    self.recorded(&name.node, value.at);
                 }
             }
             StmtKind::Predict { name, bind, expr } => {
@@ -53,6 +53,9 @@ impl Lowerer<'_> {
                     let name = Name::new(Arc::clone(name), target.span);
                     let value = self.named_draw(&name, dist, tags);
                     self.bind_value(&name, value);
+                    if at_root {
+                        self.recorded(&name.node, value.at);
+                    }
                 }
                 _ => self.keyed_draw(target, dist, tags),
             },
@@ -117,6 +120,13 @@ impl Lowerer<'_> {
             StmtKind::Expr(e) => {
                 self.expr(e);
             }
+        }
+    }
+
+    /// Records a name of the main program with every draw, unless its plan says what to collect.
+    pub fn recorded(&mut self, name: &Arc<str>, value: Operand) {
+        if self.modules[self.module].prefix.is_none() {
+            self.code.assumed.push((Arc::clone(name), value));
         }
     }
 
