@@ -15,10 +15,10 @@ pub struct Compare {
     /// The folder of a run
     #[arg(value_name = "A")]
     pub a: PathBuf,
-    /// That of another
+    /// The folder of another run
     #[arg(value_name = "B")]
     pub b: PathBuf,
-    /// Where to write their overlays side by side (.png)
+    /// A file to write their overlays to, side by side (.png)
     #[arg(short, value_name = "FILE")]
     pub out: Option<PathBuf>,
 }

@@ -16,7 +16,7 @@ pub struct Completions {
 /// `man`.
 #[derive(Args, Debug)]
 pub struct Man {
-    /// The folder to write pages to, one for each command: pcadlang.1, pcadlang-run.1, …
+    /// The folder to write the pages to, one per command: pcadlang.1, pcadlang-run.1, …
     #[arg(long, value_name = "DIR", value_hint = ValueHint::DirPath)]
     pub out: Option<PathBuf>,
 }

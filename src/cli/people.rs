@@ -9,14 +9,15 @@ use std::path::PathBuf;
 /// Which person of a photograph is meant, and what finds people.
 #[derive(Args, Clone, Debug, Default)]
 pub struct Who {
-    /// Which of the people in the photograph, the most prominent being 1: sets the program's `person`
+    /// Which person in the photograph, 1 being the most prominent: sets the program's `person`
     #[arg(long, value_name = "N", value_parser = clap::value_parser!(u32).range(1..))]
     pub person: Option<u32>,
-    /// A box in pixels of the photograph: the person who fills it best. Sets the program's `near`
+    /// A box in pixels of the photograph: selects the person who fills it best. Sets the program's
+    /// `near`
     #[arg(long = "box", value_name = "X,Y,W,H", value_parser = rectangle)]
     pub near: Option<[f64; 4]>,
-    /// A folder with networks that find people in place of the program's own: pose_detection.tflite,
-    /// pose_landmark_heavy.tflite, …_full or …_lite
+    /// A folder with networks to detect people with, instead of the built-in ones:
+    /// pose_detection.tflite, pose_landmark_heavy.tflite, …_full or …_lite
     #[arg(long, value_name = "DIR")]
     pub models: Option<PathBuf>,
 }

@@ -16,10 +16,11 @@ pub struct Show {
     /// The folder of the run
     #[arg(value_name = "RUN")]
     pub run: PathBuf,
-    /// Which of the kept states, counted from 1 in the order of the list that `show RUN` prints; the best state if left out
+    /// Which kept state, numbered from 1 as listed by `show RUN` [default: the best state]
     #[arg(long, value_name = "N", value_parser = clap::value_parser!(u32).range(1..))]
     pub draw: Option<u32>,
-    /// Where to write it: the picture over the photograph (.png) or the mesh (.obj, .glb); the choices are printed if left out
+    /// The file to write: the picture over the photograph (.png) or the mesh (.obj, .glb). Without
+    /// it, the choices are printed
     #[arg(short, value_name = "FILE")]
     pub out: Option<PathBuf>,
 }
