@@ -117,7 +117,7 @@ fn finder(folder: Option<&Path>) -> Result<PeopleFinder, Failure> {
                 .iter()
                 .map(|n| folder.join(n))
                 .find(|p| p.exists())
-                .ok_or_else(|| plain(format!("{}: none of {} is there", folder.display(), LANDMARKS.join(", "))))?;
+                .ok_or_else(|| plain(format!("{}: none of {} was found", folder.display(), LANDMARKS.join(", "))))?;
             // Detection is the same for all of them.
             let detection = match (folder.join(DETECTION), shipped()) {
                 (path, Ok((own, _))) if !path.exists() => Cow::Borrowed(own),
@@ -143,7 +143,7 @@ pub fn choose(folder: Option<&Path>) -> Result<(), Failure> {
 
 fn found(people: &[Person]) -> String {
     match people.len() {
-        0 => "nobody was found".into(),
+        0 => "no people were found".into(),
         1 => "1 person".into(),
         n => format!("{n} people, the most prominent first"),
     }
@@ -159,8 +159,8 @@ fn line(number: usize, p: &Person, (width, height): (u32, u32)) -> String {
         n => format!(", {n} other poses"),
     };
     format!(
-        "{number}: {left} to {right} across, {top} to {bottom} down; {seen} of {} landmarks in the picture; {} of {} views \
-         agree{others}; {:.0} % sure",
+        "{number}: x {left} to {right}, y {top} to {bottom}; {seen} of {} landmarks in the \
+         picture; {} of {} views agree{others}; {:.0}% confidence",
         p.landmarks.len(),
         p.agreeing,
         p.views,

@@ -150,7 +150,7 @@ fn line(k: &Known, elapsed: Duration, limit: Option<Duration>) -> String {
     }
     s.push_str(&format!(", {} steps", k.steps));
     if elapsed.as_secs_f64() >= 0.5 {
-        s.push_str(&format!(", {} a second", number((k.steps as f64 / elapsed.as_secs_f64()).round())));
+        s.push_str(&format!(", {} per second", number((k.steps as f64 / elapsed.as_secs_f64()).round())));
     }
     s
 }

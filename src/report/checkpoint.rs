@@ -17,16 +17,17 @@ const HASH: usize = 16;
 #[derive(Debug, thiserror::Error)]
 pub enum CheckpointError {
     /// It begins with something else.
-    #[error("this is no checkpoint of a chain, or one in another format")]
+    #[error("this is not a chain checkpoint, or has another format")]
     Format,
     /// Its contents have changed since it was written.
     #[error("the checkpoint is damaged")]
     Damaged,
     /// It was written by another version.
-    #[error("the checkpoint was written by pcadlang {0}; this is {VERSION}, whose chains may differ")]
+    #[error("the checkpoint was written by pcadlang {0}; chains may differ under this version, \
+             {VERSION}")]
     Version(String),
     /// It belongs to another program, data or settings.
-    #[error("the checkpoint belongs to another run: the program, its data or its settings were others")]
+    #[error("the checkpoint belongs to another run: the program, its data or its settings differ")]
     Run,
     /// It does not fit together.
     #[error("the checkpoint cannot be read: {0}")]

@@ -40,10 +40,11 @@ impl Quantity {
         let draws = || self.chains.iter().flatten();
         Some(match () {
             () if self.chains.len() < 2 => "a single chain",
-            () if self.chains.iter().any(|c| c.len() < 4) => "fewer than 4 draws a chain",
-            () if draws().any(|x| x.is_nan()) => "it is not there in every draw",
+            () if self.chains.iter().any(|c| c.len() < 4) => "fewer than 4 draws per chain",
+            () if draws().any(|x| x.is_nan()) => "it is missing from some draws",
             () if !draws().all(|x| x.is_finite()) => "it is infinite in some draws",
-            () if self.is_stuck() => "it never moved in any chain, and the chains are at different values",
+            () if self.is_stuck() => "it never moved in any chain, and the chains have different \
+                                      values",
             () => "it never moved",
         })
     }
