@@ -60,7 +60,8 @@ impl BankWriter {
             if e.features.len() as u64 != self.width {
                 let (got, first) = (e.features.len(), self.width);
                 let message =
-                    format!("a picture has {got} features, the first one had {first}; every one must have as many");
+                    format!("a picture has {got} features, but the first had {first}; all must \
+                             have the same number");
                 return Err(BankError::Command(message));
             }
             e.features.iter().for_each(|x| features.extend(x.to_le_bytes()));
