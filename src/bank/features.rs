@@ -125,8 +125,12 @@ impl Observed {
     /// If what they are of is not observed, or a command fails.
     pub fn query(&self, features: &Features, detector: Option<&str>) -> Result<Query, BankError> {
         let image = self.image.as_ref().and_then(|v| v.downcast::<ImageValue>());
-        let missing = |what: &str| BankError::Observed(format!("it is searched by {what}, but the \
-            run observes none"));
+        let missing = |what: &str| {
+            BankError::Observed(format!(
+                "it is searched by {what}, but the \
+            run observes none"
+            ))
+        };
         match features {
             Features::Contours { .. } => {
                 let image = image.ok_or_else(|| missing("the contours of a picture"))?;

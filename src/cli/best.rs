@@ -116,8 +116,10 @@ fn draw(
     }
     let caption = match located.is_empty() {
         true => "the best state over it",
-        false => "the best state over it; the model's joints in yellow, each joined to its \
-                  detected position",
+        false => {
+            "the best state over it; the model's joints in yellow, each joined to its \
+                  detected position"
+        }
     };
     shown.pictures.push((caption, overlay));
     let (spread, agreement) = frequency(chains, seed, 128);

@@ -139,8 +139,10 @@ fn ranks(path: &str, said: &Sbc, seed: u64, took: f64) -> String {
         said.rows.len(),
     ));
     if said.rows.iter().any(|r| r.is_short) {
-        s.push_str("few draws: some chains have a smaller effective sample size than the number \
-                    of ranked draws; increase --steps\n");
+        s.push_str(
+            "few draws: some chains have a smaller effective sample size than the number \
+                    of ranked draws; increase --steps\n",
+        );
     }
     s.push_str(&format!("seed {seed}, {} steps per chain, {}\n", said.steps, seconds(took)));
     s
@@ -172,8 +174,14 @@ fn turns(path: &str, said: &Geweke, seed: u64, took: f64) -> String {
 }
 
 fn more(left_out: usize) -> String {
-    if left_out == 0 { String::new() } else { format!("… and {left_out} more, present in fewer \
-        states\n") }
+    if left_out == 0 {
+        String::new()
+    } else {
+        format!(
+            "… and {left_out} more, present in fewer \
+        states\n"
+        )
+    }
 }
 
 /// Counts as bars, level with the largest.

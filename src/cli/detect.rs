@@ -113,11 +113,10 @@ fn finder(folder: Option<&Path>) -> Result<PeopleFinder, Failure> {
             (Cow::Borrowed(detection), Cow::Borrowed(landmarks), "the program's own".to_owned())
         }
         Some(folder) => {
-            let best = LANDMARKS
-                .iter()
-                .map(|n| folder.join(n))
-                .find(|p| p.exists())
-                .ok_or_else(|| plain(format!("{}: none of {} was found", folder.display(), LANDMARKS.join(", "))))?;
+            let best =
+                LANDMARKS.iter().map(|n| folder.join(n)).find(|p| p.exists()).ok_or_else(|| {
+                    plain(format!("{}: none of {} was found", folder.display(), LANDMARKS.join(", ")))
+                })?;
             // Detection is the same for all of them.
             let detection = match (folder.join(DETECTION), shipped()) {
                 (path, Ok((own, _))) if !path.exists() => Cow::Borrowed(own),

@@ -49,7 +49,10 @@ fn find(table: &Table, words: &str) -> Result<(), Failure> {
         print_line!("{}\n    {}", b.signature(), b.doc);
     }
     match found.entries.len() {
-        0 => Err(Failure::Plain(format!("no built-in matches {words:?}"), Some("`pcadlang doc` lists all of them".into()))),
+        0 => Err(Failure::Plain(
+            format!("no built-in matches {words:?}"),
+            Some("`pcadlang doc` lists all of them".into()),
+        )),
         n if n > LISTED => {
             print_line!("… and {} more; another word narrows it down", n - LISTED);
             Ok(())

@@ -109,11 +109,17 @@ fn compared(what: &str, now: &Replication, draws: &[Vec<Replication>]) -> String
         }
     }
     let mut s = table::aligned(&rows);
-    let _ = writeln!(s, "tail: the fraction of {what} replications beyond the observed value (a \
-                         predictive p-value); 0.5 is the centre");
+    let _ = writeln!(
+        s,
+        "tail: the fraction of {what} replications beyond the observed value (a \
+                         predictive p-value); 0.5 is the centre"
+    );
     if marked {
-        let _ = writeln!(s, "*: tail probability below {EXTREME} on one side: the program rarely \
-                             produces such data");
+        let _ = writeln!(
+            s,
+            "*: tail probability below {EXTREME} on one side: the program rarely \
+                             produces such data"
+        );
     }
     s
 }

@@ -14,8 +14,10 @@ pub fn run(a: &Run) -> Result<(), Failure> {
     let ready = job::prepare(job, a.quiet)?;
     let (_, default_plan) = ready.model.plan()?;
     if let (Some(text), false) = (&default_plan, a.quiet) {
-        error_line!("note: the program has no `infer` block; using this default plan, which you \
-                     can copy and edit:\n{text}");
+        error_line!(
+            "note: the program has no `infer` block; using this default plan, which you \
+                     can copy and edit:\n{text}"
+        );
     }
     let interrupt = Interrupt::listen();
     let record = job::record(job, ready.model.hash(), &job::inputs_hash(job, &ready.model)?);

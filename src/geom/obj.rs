@@ -33,7 +33,12 @@ pub fn load_in(bytes: &[u8], frame: &FileFrame) -> Result<Mesh, GeomError> {
     let (plain, names) = plain(text(bytes)?)?;
     let options = tobj::LoadOptions { triangulate: true, ignore_points: true, ignore_lines: true, single_index: false };
     let no_materials = |_: &std::path::Path| Ok((Vec::new(), Default::default()));
-    let unreadable = |e: &dyn std::fmt::Display| GeomError::invalid(format!("the OBJ file cannot be read: {e}"));
+    let unreadable = |e: &dyn std::fmt::Display| {
+        GeomError::invalid(format!(
+            "cannot read the OBJ \
+        file: {e}"
+        ))
+    };
     let (models, _) = tobj::load_obj_buf(&mut plain.as_bytes(), &options, no_materials).map_err(|e| unreadable(&e))?;
     let (mut positions, mut triangles, mut parts) = (Vec::new(), Vec::new(), Vec::new());
     for m in models.iter().filter(|m| !m.mesh.indices.is_empty()) {
@@ -184,7 +189,7 @@ fn face<'a>(words: impl Iterator<Item = &'a str>, vertices: i64) -> Result<Vec<i
         let v = number.parse::<i64>().map_err(|_| format!("a corner must be the number of a vertex, got `{w}`"))?;
         let place = if v < 0 { vertices.saturating_add(v).saturating_add(1) } else { v };
         if !(1..=vertices).contains(&place) {
-            return Err(format!("there is no vertex {v}; there are {vertices} so far"));
+            return Err(format!("no vertex {v}; {vertices} are defined so far"));
         }
         corners.push(place);
         if corners.len() > MOST_CORNERS {

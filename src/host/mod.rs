@@ -99,8 +99,11 @@ impl Host {
                     "a name is a letter or `_`, then letters, digits and `_`, and not a keyword",
                 );
             } else if own.constant(name).is_some() || taken && !e.replaces {
-                wrong(format!("`{name}` is a built-in of the language"), "choose another name; \
-                    functions can be `replacing()`");
+                wrong(
+                    format!("`{name}` is a built-in of the language"),
+                    "choose another name; \
+                    functions can be `replacing()`",
+                );
             } else if self.entries[..i].iter().any(|o| o.builtin.name == b.name) {
                 wrong(format!("the host registers `{name}` twice"), "");
             }

@@ -39,8 +39,10 @@ pub(crate) fn score(dist: &Dist, observed: &Value) -> Result<Score, Fault> {
     if let Some(count) = dist.elements() {
         if observed.len() != Some(count) {
             let got = observed.len().map_or(observed.type_name().to_owned(), |l| format!("{l} values"));
-            return Err(Fault::type_error(format!("the distribution has {count} elements, but the \
-                observed value has {got}")));
+            return Err(Fault::type_error(format!(
+                "the distribution has {count} elements, but the \
+                observed value has {got}"
+            )));
         }
         return sum_scores(count, |i| {
             let x = observed.element(i).as_ref().and_then(Value::to_datum).ok_or_else(wrong)?;

@@ -23,8 +23,10 @@ pub enum CheckpointError {
     #[error("the checkpoint is damaged")]
     Damaged,
     /// It was written by another version.
-    #[error("the checkpoint was written by pcadlang {0}; chains may differ under this version, \
-             {VERSION}")]
+    #[error(
+        "the checkpoint was written by pcadlang {0}; chains may differ under this version, \
+             {VERSION}"
+    )]
     Version(String),
     /// It belongs to another program, data or settings.
     #[error("the checkpoint belongs to another run: the program, its data or its settings differ")]

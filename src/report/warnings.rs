@@ -25,8 +25,10 @@ pub fn warnings(quantities: &[Quantity], modes: &[Mode], kernels: &[KernelStats]
     if let Some((r, name)) = worst(quantities, |q| q.summary.r_hat).filter(|(r, _)| *r > 1.01) {
         let what = if r > DISAGREE { "the chains disagree" } else { "the chains may not have mixed" };
         let r = if r > 100.0 { "above 100".to_owned() } else { format!("{r:.2}") };
-        out.push(format!("{what}: R-hat of {name} is {r} (it should be at most 1.01); run longer \
-                          with --time or --steps"));
+        out.push(format!(
+            "{what}: R-hat of {name} is {r} (it should be at most 1.01); run longer \
+                          with --time or --steps"
+        ));
     }
     out.extend(modes::warning(modes));
     let wanted = 100 * chains;

@@ -109,8 +109,11 @@ fn people(path: &Path) -> Result<Dataset, Failure> {
     for Person { id, image } in all.people {
         // The picture lies in the dataset.
         if image.is_empty() || Path::new(&image).components().any(|c| !matches!(c, Component::Normal(_))) {
-            return Err(plain(format!("{}: the image of {id}, {image:?}, is not a file in the same \
-                                      folder", file.display())));
+            return Err(plain(format!(
+                "{}: the image of {id}, {image:?}, is not a file in the same \
+                                      folder",
+                file.display()
+            )));
         }
         cases.push(Case { name: id, image: path.join(image), camera: None });
     }

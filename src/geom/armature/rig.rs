@@ -72,7 +72,7 @@ impl Rig {
                 return Err(GeomError::invalid(format!("two joints of the rig are called `{}`", j.name)));
             }
             if !(j.head.is_finite() && j.tail.is_finite()) {
-                return Err(GeomError::invalid(format!("joint `{}` is not at a finite place", j.name)));
+                return Err(GeomError::invalid(format!("the position of joint `{}` is not finite", j.name)));
             }
         }
         let mut parents = Vec::with_capacity(given.len());
@@ -80,7 +80,11 @@ impl Rig {
             parents.push(match &j.parent {
                 None => None,
                 Some(p) => Some(*index.get(p.as_str()).ok_or_else(|| {
-                    GeomError::invalid(format!("joint `{}` has the parent `{p}`, which the rig does not have", j.name))
+                    GeomError::invalid(format!(
+                        "joint `{}` has the parent `{p}`, which is not in \
+                        the rig",
+                        j.name
+                    ))
                 })?),
             });
         }
@@ -117,14 +121,17 @@ impl Rig {
         for (name, joint, rest) in points {
             let Some(j) = self.find(&joint) else {
                 return Err(GeomError::invalid(format!(
-                    "keypoint `{name}` rides on the joint `{joint}`, which the rig does not have"
+                    "keypoint `{name}` is attached to the joint `{joint}`, which is not in the rig"
                 )));
             };
             if self.keypoints.iter().any(|k| *k.name == *name) {
                 return Err(GeomError::invalid(format!("two keypoints of the rig are called `{name}`")));
             }
             if !rest.is_finite() {
-                return Err(GeomError::invalid(format!("keypoint `{name}` is not at a finite place")));
+                return Err(GeomError::invalid(format!(
+                    "the position of keypoint `{name}` is not \
+                    finite"
+                )));
             }
             self.keypoints.push(Keypoint { name: name.into(), joint: j, rest });
         }

@@ -65,8 +65,13 @@ pub(super) fn step_within(
 pub(super) fn simulate(trace: &Trace, draws: Draws, span: Span) -> TraceResult<f64> {
     let replicate = trace.replicate(draws)?;
     if let Some((address, what)) = replicate.silent.first() {
-        return Err(fail(span, format!("abc simulates all observations, but {address} is {what}, \
-                                       which has no sampler")));
+        return Err(fail(
+            span,
+            format!(
+                "abc simulates all observations, but {address} is {what}, \
+                                       which has no sampler"
+            ),
+        ));
     }
     let observed = trace.observed();
     let (mut squares, mut count) = (0.0, 0.0);

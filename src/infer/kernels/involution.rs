@@ -194,8 +194,15 @@ impl Own {
             }
         }
         let log = libm::log(matrix.determinant().abs());
-        if log.is_finite() { Ok(log) } else { Err(self.fault("its Jacobian is singular or not \
-            finite".into())) }
+        if log.is_finite() {
+            Ok(log)
+        } else {
+            Err(self.fault(
+                "its Jacobian is singular or not \
+            finite"
+                    .into(),
+            ))
+        }
     }
 }
 

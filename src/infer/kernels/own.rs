@@ -255,8 +255,15 @@ impl Play<'_> {
             return Ok(Image::Choice(address, found));
         };
         let drawn = self.played.drawn.iter().rposition(|d| d.name == *name);
-        let not = || fail(target.span, format!("`{name}` is not an auxiliary variable; propose \
-            {name} ~ …; makes one"));
+        let not = || {
+            fail(
+                target.span,
+                format!(
+                    "`{name}` is not an auxiliary variable; propose \
+            {name} ~ …; makes one"
+                ),
+            )
+        };
         drawn.map(Image::Auxiliary).ok_or_else(not)
     }
 
@@ -270,8 +277,11 @@ impl Play<'_> {
         let at = address(target, &mut self.env(trace, variables))?;
         let Some(found) = trace.find(&at) else {
             let mut e = fail(target.span, format!("this state has no choice {at}"));
-            e.hint = Some("a kernel can propose only choices that exist in the current state; mh \
-                           and block can create others".into());
+            e.hint = Some(
+                "a kernel can propose only choices that exist in the current state; mh \
+                           and block can create others"
+                    .into(),
+            );
             return Err(e);
         };
         Ok((at, found))

@@ -94,8 +94,7 @@ impl Runner<'_> {
         arm: Option<usize>,
     ) -> Result<Flow, ChainError> {
         if self.path.len() >= MOST_NESTED {
-            let message =
-                format!("statements and kernels of the plan are nested more than {MOST_NESTED} deep");
+            let message = format!("statements and kernels of the plan are nested more than {MOST_NESTED} deep");
             return Err(fail(e.span, message).into());
         }
         self.note(Doing::Kernel { arm, steps: 0, done: Outcome::default() });
@@ -138,8 +137,10 @@ impl Runner<'_> {
                 i
             }
             None if self.instances.len() >= MOST => {
-                let message = format!("this run already has {MOST} kernels (a kernel with \
-                                       different arguments counts as another)");
+                let message = format!(
+                    "this run already has {MOST} kernels (a kernel with \
+                                       different arguments counts as another)"
+                );
                 return Err(fail(e.span, message).into());
             }
             None => {

@@ -55,8 +55,12 @@ impl Lowerer<'_> {
         match &s.kind {
             KStmtKind::Warmup { count, body } => {
                 if around.in_loop || around.in_kernel {
-                    self.error("`warmup` is allowed only at the top level of an inference block", s.span, "inside a loop or kernel")
-                        .hint_also("infer { warmup 1000 { … } repeat 1000 { … collect x; } }");
+                    self.error(
+                        "`warmup` is allowed only at the top level of an inference block",
+                        s.span,
+                        "inside a loop or kernel",
+                    )
+                    .hint_also("infer { warmup 1000 { … } repeat 1000 { … collect x; } }");
                 }
                 self.count(count, around);
                 let mut inner = Around { in_loop: true, in_warmup: true, ..around.clone() };
@@ -86,9 +90,13 @@ impl Lowerer<'_> {
             }
             KStmtKind::StopWhen(e) => {
                 if !around.in_loop {
-                    self.error("`stop when` is allowed only in a loop, which it ends", s.span, "not \
-                        in a loop")
-                        .hint_also("repeat 1000 { … stop when …; }");
+                    self.error(
+                        "`stop when` is allowed only in a loop, which it ends",
+                        s.span,
+                        "not \
+                        in a loop",
+                    )
+                    .hint_also("repeat 1000 { … stop when …; }");
                 }
                 self.plan_expr(e, around);
             }
@@ -185,13 +193,24 @@ impl Lowerer<'_> {
         match table.find("", name).map(|i| table.get(i)) {
             Some(b) if matches!(b.kind, Kind::Inference) => {
                 if b.returns != Type::Kernel {
-                    self.error(format!("`{name}` is not a kernel"), callee.span, format!("it \
-                        returns {}", shown(b.returns)));
+                    self.error(
+                        format!("`{name}` is not a kernel"),
+                        callee.span,
+                        format!(
+                            "it \
+                        returns {}",
+                            shown(b.returns)
+                        ),
+                    );
                     return;
                 }
                 if &**name == "init" && around.in_loop {
-                    self.error("`init` is allowed only at the top level of an inference block", e.span, "inside a loop")
-                        .hint_also("infer { init(best_of(100)); repeat 1000 { … } }");
+                    self.error(
+                        "`init` is allowed only at the top level of an inference block",
+                        e.span,
+                        "inside a loop",
+                    )
+                    .hint_also("infer { init(best_of(100)); repeat 1000 { … } }");
                 }
                 if &**name == "anneal" && !around.in_warmup {
                     self.error("`anneal` is allowed only in `warmup`", e.span, "draws are kept here")

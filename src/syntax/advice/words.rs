@@ -73,8 +73,12 @@ impl Rules<'_, '_> {
                 return say(message, "not a statement of an inference plan", "move it outside `infer` or `kernel`");
             }
             if found.starts_item() && *found != Token::Fn {
-                return say(format!("`{word}` is allowed only at the top level"), "this is inside a block", "move \
-                    it out of the block");
+                return say(
+                    format!("`{word}` is allowed only at the top level"),
+                    "this is inside a block",
+                    "move \
+                    it out of the block",
+                );
             }
         }
         if self.back(1) == Some(&Token::Fn) && matches!(found, Token::Name(_)) {

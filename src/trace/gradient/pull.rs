@@ -195,8 +195,13 @@ impl Reverse<'_> {
         if !matches!(self.graph.nodes[n as usize].side.as_deref(), Some(Side::Deps(_))) {
             return Ok(());
         }
-        let Some(elements) = self.gathered(n) else { return Err(self.no_derivative(n, "the result \
-            of this map")) };
+        let Some(elements) = self.gathered(n) else {
+            return Err(self.no_derivative(
+                n,
+                "the result \
+            of this map",
+            ));
+        };
         for (i, d) in elements.into_iter().enumerate() {
             let part = match &self.graph.nodes[n as usize].value {
                 Value::Record(r) => r.get_index(i).map_or(Adjoint::Zero, |(name, _)| by.field(name)),

@@ -142,8 +142,10 @@ impl Trace {
         loop {
             let joins = m.partition.joins();
             let mut table = Table::new(m, &m.partition).map_err(|i| {
-                let what = format!("it is coupled with other choices, and together they have more \
-                                    than {MOST_VALUES} joint values");
+                let what = format!(
+                    "it is coupled with other choices, and together they have more \
+                                    than {MOST_VALUES} joint values"
+                );
                 self.cannot_sum(m.sites[i], &what)
             })?;
             let (mut found, mut asked) = (Found::default(), Asked::default());
@@ -168,8 +170,13 @@ impl Trace {
                 }
                 match self.moved_support(m) {
                     Some(_) if !at.is_empty() => return Ok(Explored::Nowhere),
-                    Some(t) => return Err(self.cannot_sum(t, "its possible values depend on other \
-                        choices")),
+                    Some(t) => {
+                        return Err(self.cannot_sum(
+                            t,
+                            "its possible values depend on other \
+                        choices",
+                        ));
+                    }
                     None => {}
                 }
                 let mut reader = Reader::new(&self.graph, &self.code, &own, &mut m.partition);
@@ -217,10 +224,11 @@ impl Trace {
                 let label = Reader::new(&self.graph, &self.code, own, &mut m.partition).read_failed(&failed);
                 self.graph.rollback(&self.code, before);
                 match new {
-                    Some(node) => {
-                        Err(self.cannot_sum(Target { node, element: NONE }, "it is improper and \
-                            is created together with other choices"))
-                    }
+                    Some(node) => Err(self.cannot_sum(
+                        Target { node, element: NONE },
+                        "it is improper and \
+                            is created together with other choices",
+                    )),
                     None => Ok(Err(label)),
                 }
             }
