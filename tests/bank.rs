@@ -141,9 +141,9 @@ fn entries_come_back_and_the_nearest_picture_of_an_entry_is_its_own() {
 #[test]
 fn banks_that_do_not_fit_are_refused() {
     let f = small("bank_refused");
-    refused(&f, "small.bank cannot be read: there is no such file");
+    refused(&f, "small.bank: no such file");
     f.write("small.bank", "not a bank");
-    refused(&f, "it is no bank");
+    refused(&f, "it is not a bank");
     f.succeeds(&LEARN);
     f.succeeds(&[&RUN[..], &["--quiet"]].concat());
     let whole = std::fs::read(f.path().join("small.bank")).unwrap();
@@ -165,10 +165,10 @@ fn banks_that_do_not_fit_are_refused() {
     let at = other.len() - 10;
     other[at] ^= 1;
     f.write("small.bank", &other);
-    refused(&f, "header was changed");
+    refused(&f, "header is altered");
     // Features of what is not observed.
     f.write("bare.pcad", "assume x ~ normal(0, 1); observe normal(x, 1) = 0;");
-    f.refuses(&["learn", "bare.pcad", "-o", "bare.bank"], "the program has no picture");
+    f.refuses(&["learn", "bare.pcad", "-o", "bare.bank"], "the program has nothing to draw");
     f.refuses(&["learn", "small.pcad", "-o", "k.bank", "--features", "keypoints"], "no landmarks");
     f.refuses(&["learn", "small.pcad", "-o", "no/such/folder.bank"], "cannot write no/such/folder.bank");
 }

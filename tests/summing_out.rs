@@ -233,7 +233,7 @@ fn what_cannot_be_summed_out_is_an_error() {
         ),
         (
             "assume z ~ flip(0.4); assume k ~ uniform_discrete(0, if z { 2 } else { 1 }); let m = k;",
-            "what values there are",
+            "its possible values depend on other choices",
         ),
         ("assume z ~ flip(0.4); assume b ~ flat(); let m = if z { b } else { 0 };", "improper"),
     ] {

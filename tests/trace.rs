@@ -187,7 +187,7 @@ fn saved_choices_occur_in_the_program() {
         assert!(load(&saved).is_ok(), "{text}");
         saved["choices"][0]["hash"] = "0000000000000001".into();
         let e = load(&saved).expect_err(text);
-        assert_eq!(e, "the trace has a choice @a which the program does not make");
+        assert_eq!(e, "the trace has a choice @a that the program does not make");
     }
 }
 
@@ -461,7 +461,7 @@ fn a_number_that_turns_into_an_array_is_an_error() {
     let mut number = (0..20).map(|i| model.simulate(1, i).unwrap()).find(|t| is(t, false)).unwrap();
     let before = number.log_joint();
     let error = number.set("@k", true, Streams::default()).unwrap_err().to_string();
-    assert!(error.contains("its parameters turned into arrays"), "{error}");
+    assert!(error.contains("its parameters became arrays"), "{error}");
     assert!(is(&number, false) && number.log_joint() == before);
     // The other way round all is told.
     let mut array = (0..20).map(|i| model.simulate(1, i).unwrap()).find(|t| is(t, true)).unwrap();

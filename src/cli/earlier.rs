@@ -103,9 +103,9 @@ mod tests {
         there["settings"]["time"] = json!(3.5);
         there["program_hash"] = json!("c");
         there["set"] = json!({});
-        let expected = ["program", "seed (2 there, 1 now)", r#"--set (none there, {"x":"2","y":"3"} now)"#];
+        let expected = ["program", "seed (was 2, now 1)", r#"--set (was none, now {"x":"2","y":"3"})"#];
         assert_eq!(differences(&there, &record)[..3], expected);
-        assert_eq!(differences(&there, &record)[3..], ["time (3.5 there, none now)"]);
+        assert_eq!(differences(&there, &record)[3..], ["time (was 3.5, now none)"]);
         assert_eq!(differences(&json!([]), &record).len(), 6);
     }
 }

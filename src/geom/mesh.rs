@@ -195,7 +195,7 @@ mod tests {
         let e = Mesh::new(p.clone(), vec![[0, 1, 2]], vec![u16::MAX]).unwrap_err().to_string();
         assert_eq!(e, "a mesh has at most 65535 parts, numbered from 0");
         let e = Mesh::new(p, vec![[0, 1, 2]; MOST_TRIANGLES + 1], vec![]).unwrap_err().to_string();
-        assert_eq!(e, "a mesh of 5000001 triangles; at most 5000000");
+        assert_eq!(e, "the mesh has 5000001 triangles; at most 5000000 are allowed");
     }
 
     #[test]

@@ -243,7 +243,7 @@ impl Entry {
     /// let sqrt = || Entry::function("sqrt", |a| Ok(Value::Num(a.num(0)?.abs().sqrt()))).argument("x", Type::Num, "A number.");
     /// let program = || Program::parse("let x = sqrt(-4);");
     /// let taken = program()?.host(&Host::new().with(sqrt())).err().unwrap();
-    /// assert!(taken.to_string().contains("`sqrt` is a name of the language"));
+    /// assert!(taken.to_string().contains("`sqrt` is a built-in of the language"));
     /// assert!(program()?.host(&Host::new().with(sqrt().replacing()))?.compile().is_ok());
     /// # Ok::<(), pcadlang::Error>(())
     /// ```

@@ -104,7 +104,10 @@ mod tests {
         let other = SavedChain { version: "0.0.1".into(), ..saved }.to_bytes();
         assert_eq!(
             error(&other, "a").to_string(),
-            format!("the checkpoint was written by pcadlang 0.0.1; this is {VERSION}, whose chains may differ")
+            format!(
+                "the checkpoint was written by pcadlang 0.0.1; chains may differ under this \
+                     version, {VERSION}"
+            )
         );
     }
 }

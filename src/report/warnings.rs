@@ -108,8 +108,11 @@ mod tests {
             warnings(&all, &modes(&all, None), &[], 2)
         };
         assert!(w[0].starts_with("the chains disagree: R-hat of far is"), "{w:?}");
-        assert!(w[1].starts_with("each of the 2 chains is in a mode of its own"), "{w:?}");
-        assert!(w[2].starts_with("few independent draws: ") && w[2].contains("of far (200 are wanted)"), "{w:?}");
+        assert!(w[1].starts_with("the 2 chains are each in a different mode"), "{w:?}");
+        assert!(
+            w[2].starts_with("low effective sample size: ") && w[2].contains("for far (at least 200 recommended)"),
+            "{w:?}"
+        );
     }
 
     #[test]

@@ -210,12 +210,16 @@ mod tests {
         let e = |joints| Rig::new(joints).unwrap_err().to_string();
         assert_eq!(e(vec![]), "a rig has 1 to 4096 joints, not 0");
         assert_eq!(e(vec![joint("a", None), joint("a", None)]), "two joints of the rig are called `a`");
-        assert_eq!(e(vec![joint("a", Some("x"))]), "joint `a` has the parent `x`, which the rig does not have");
+        assert_eq!(
+            e(vec![joint("a", Some("x"))]),
+            "joint `a` has the parent `x`, which is not in \
+            the rig"
+        );
         let round = vec![joint("r", None), joint("a", Some("c")), joint("b", Some("a")), joint("c", Some("b"))];
         assert_eq!(e(round), "the rig has a cycle: c -> b -> a -> c");
         assert_eq!(e(vec![joint("a", Some("a"))]), "the rig has a cycle: a -> a");
         let rig = Rig::new(vec![joint("a", None)]).unwrap();
         let e = rig.with_keypoints(vec![("nose".into(), "head".into(), DVec3::ZERO)]).unwrap_err().to_string();
-        assert_eq!(e, "keypoint `nose` rides on the joint `head`, which the rig does not have");
+        assert_eq!(e, "keypoint `nose` is attached to the joint `head`, which is not in the rig");
     }
 }

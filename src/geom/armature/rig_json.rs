@@ -176,10 +176,10 @@ mod tests {
     #[test]
     fn what_is_wrong_is_said() {
         let e = |weights: &str| rig(weights, "").unwrap_err().to_string();
-        assert_eq!(e("[[[0, 1]], []]"), "vertex 1 has no skin weight: nothing would move it");
+        assert_eq!(e("[[[0, 1]], []]"), "vertex 1 has no skin weight, so no joint would move it");
         assert_eq!(e("[[[2, 1]]]"), "vertex 0 is moved by joint 2, but the rig has 2 joints");
         assert!(e("[[[0, 0.2], [0, 0.2], [0, 0.2], [0, 0.2], [0, 0.2]]]").starts_with("vertex 0 has 5 skin weights"));
-        assert!(e("7").starts_with("the rig file cannot be read: invalid type: integer `7`"));
+        assert!(e("7").starts_with("cannot read the rig file: invalid type: integer `7`"));
         assert!(rig_from_json(b"{").is_err());
     }
 }

@@ -203,14 +203,14 @@ mod tests {
         for (text, why) in [
             ("a: [ 1, 2", "line 1: the file is truncated: a list has no end"),
             ("a: ]", "line 1: `]` without `[`"),
-            ("a:\n- [ 1, x ]", "line 2: `x` is no number"),
-            ("a: 1.2.3", "line 1: `1.2.3` is no number"),
-            ("a: inf", "line 1: `inf` is no number"),
-            ("a: 1e999", "line 1: `1e999` is no number"),
+            ("a:\n- [ 1, x ]", "line 2: `x` is not a number"),
+            ("a: 1.2.3", "line 1: `1.2.3` is not a number"),
+            ("a: inf", "line 1: `inf` is not a number"),
+            ("a: 1e999", "line 1: `1e999` is not a number"),
             ("a: [[[1]]]", "line 1: lists are nested too deeply"),
-            ("\n\n{a}", "line 3: `{` was not expected"),
-            ("a: \u{e4}", "line 1: `\\u{c3}` was not expected"),
-            ("a: 1, 2", "line 1: `,` was not expected"),
+            ("\n\n{a}", "line 3: unexpected `{`"),
+            ("a: \u{e4}", "line 1: unexpected `\\u{c3}`"),
+            ("a: 1, 2", "line 1: unexpected `,`"),
         ] {
             assert_eq!(tokens(text).unwrap_err(), why, "{text}");
         }

@@ -61,12 +61,17 @@ mod tests {
         };
         assert_eq!(
             said(&["nose", "l_wirst"], &rig),
-            "`l_wirst` was detected, and the scene has no such landmark; did you mean `l_wrist`? It has l_wrist, nose, tail"
+            "`l_wirst` was detected, but the scene has no such landmark; did you mean `l_wrist`? \
+             It has l_wrist, nose, tail"
         );
-        assert_eq!(said(&["wing"], &["a"]), "`wing` was detected, and the scene has no such landmark; it has a");
+        assert_eq!(
+            said(&["wing"], &["a"]),
+            "`wing` was detected, but the scene has no such \
+            landmark; it has a"
+        );
         assert_eq!(
             said(&["l_hip"], &[]),
-            "`l_hip` was detected, and the scene has no such landmark; it has no landmarks"
+            "`l_hip` was detected, but the scene has no such landmark; it has no landmarks"
         );
     }
 }

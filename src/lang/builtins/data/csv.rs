@@ -148,7 +148,7 @@ mod tests {
             read("a,b\n\"1,5\",\"say \"\"hi\"\"\nthere\"\n"),
             "{ a: [\"1,5\"], b: [\"say \\\"hi\\\"\\nthere\"] }"
         );
-        assert_eq!(read("a,b\n\"1\n2\",x\n3\n"), "line 4: 1 fields where the header has 2");
+        assert_eq!(read("a,b\n\"1\n2\",x\n3\n"), "line 4: 1 fields, but the header has 2");
     }
 
     #[test]
@@ -159,11 +159,11 @@ mod tests {
             "line 1: the first line must be a header with the column \
                                       names, but it contains only numbers"
         );
-        assert_eq!(read("x,y\n1,2\n3"), "line 3: 1 fields where the header has 2");
+        assert_eq!(read("x,y\n1,2\n3"), "line 3: 1 fields, but the header has 2");
         assert_eq!(read("x,x\n1,2"), "line 1: there are two columns `x`");
         assert_eq!(read("x,\n1,2"), "line 1: column 2 has no name");
-        assert_eq!(read("x,y\n1,2\n\n,3"), "line 4: column `x` is empty there; leave out the row");
-        assert_eq!(read("x\n1\nnan"), "line 3: column `x` has a NaN; leave out the row");
+        assert_eq!(read("x,y\n1,2\n\n,3"), "line 4: column `x` is empty; remove the row");
+        assert_eq!(read("x\n1\nnan"), "line 3: column `x` is NaN; remove the row");
         assert_eq!(read("x\n\"1"), "line 2: a quoted field is not closed");
         assert_eq!(parse(&[b'x', 0xff]).unwrap_err(), "not UTF-8 text (byte 1)");
     }
