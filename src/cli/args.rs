@@ -402,7 +402,7 @@ pub struct Check {
     /// Geweke's test: alternate the plan with simulating data, and compare the draws with the prior
     #[arg(long)]
     pub geweke: bool,
-    /// The number of data sets for --sbc [default: 200] or chains for --geweke [default: 100]
+    /// The number of data sets for --sbc [default: 200], of chains for --geweke [default: 100]
     #[arg(long, value_parser = clap::value_parser!(u32).range(20..=1_000_000))]
     pub replicates: Option<u32>,
     /// The random seed: the same seed gives the same result

@@ -40,8 +40,7 @@ pub(crate) fn score(dist: &Dist, observed: &Value) -> Result<Score, Fault> {
         if observed.len() != Some(count) {
             let got = observed.len().map_or(observed.type_name().to_owned(), |l| format!("{l} values"));
             return Err(Fault::type_error(format!(
-                "the distribution has {count} elements, but the \
-                observed value has {got}"
+                "expected {count} observed values, one per element of the distribution, got {got}"
             )));
         }
         return sum_scores(count, |i| {

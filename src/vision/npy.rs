@@ -207,9 +207,9 @@ mod tests {
         for n in 0..good.len() {
             assert!(parse(&good[..n]).is_err(), "{n}");
         }
-        assert!(message(&good[..good.len() - 1]).contains("cut short"));
+        assert!(message(&good[..good.len() - 1]).contains("truncated"));
         assert!(message(&[&good[..], &[0]].concat()).contains("9 bytes"));
-        assert!(message(b"hello, world").contains("does not begin"));
+        assert!(message(b"hello, world").contains("does not start"));
         assert!(message(b"PK\x03\x04....").contains(".npz"));
         assert!(message(&bytes_of(1, ">f4", "False", "(2,)", &[0; 8])).contains(">f4"));
         assert!(message(&bytes_of(1, "<f4", "True", "(2,)", &[0; 8])).contains("Fortran"));
