@@ -121,7 +121,7 @@ fn meshes_that_are_none() {
         ("v 0 0 0\nv 1 0 0\nv 0 1 0\nf 0 1 2\n", "line 4"),
         ("v 0 0 0\nv 1 0 0\nv 0 1 0\nf -4 1 2\n", "line 4"),
         ("v 0 0 0\nv 1 0 0\nv 0 1 0\nf 99999999999999999999 1 2\n", "line 4"),
-        ("v 0 0 0\nv 0 0 0\nv 0 0 0\nf 1 2 3\n", "no triangle with an area"),
+        ("v 0 0 0\nv 0 0 0\nv 0 0 0\nf 1 2 3\n", "have zero area"),
         ("hello\n", "no faces"),
     ] {
         f.write("x.obj", text);
@@ -178,9 +178,9 @@ fn programs_that_are_none() {
     f.write("p.pcad", "include \"part.pcad\" as part; assume x ~ normal(0, 1);");
     f.refuses(&run(&[]), "part.pcad");
     f.write("p.pcad", "include \"p.pcad\" as me; assume x ~ normal(0, 1);");
-    f.refuses(&run(&[]), "circle");
+    f.refuses(&run(&[]), "cycle");
     f.write("p.pcad", "include \"./p.pcad\" as me; assume x ~ normal(0, 1);");
-    f.refuses(&run(&[]), "circle");
+    f.refuses(&run(&[]), "cycle");
 }
 
 /// An empty program is no mistake; it has nothing to say.

@@ -148,9 +148,9 @@ fn banks_that_do_not_fit_are_refused() {
     f.succeeds(&[&RUN[..], &["--quiet"]].concat());
     let whole = std::fs::read(f.path().join("small.bank")).unwrap();
     // Another program, in text or parameters.
-    refused_with(&f, &["--set", "sides=13"], "learnt from another program");
+    refused_with(&f, &["--set", "sides=13"], "made from another program");
     f.write("small.pcad", SMALL.replace("0.8, 3", "0.8, 4"));
-    refused(&f, "learnt from another program");
+    refused(&f, "made from another program");
     f.write("small.pcad", SMALL);
     // Another version, a file cut short, a header that was changed.
     let mut other = whole.clone();

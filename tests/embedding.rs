@@ -222,7 +222,7 @@ fn names_that_clash_or_are_none_are_errors() {
         "`two words` is not a valid name",
         "the host registers `mine` twice",
         "`pi` is a built-in of the language",
-        "`f`: `b` must be given",
+        "`f`: the required argument `b` must come before",
         "`d`: only functions take a gradient",
     ] {
         assert!(text.contains(part), "{part}: {text}");

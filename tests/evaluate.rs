@@ -244,7 +244,7 @@ fn other_settings_are_an_error_that_names_them() {
     f.refuses(&with(&["--set", "sd=2"]), "program, --set");
     f.refuses(
         &with(&["--time", "3s", "--no-incremental"]),
-        "time (was none, now 3.0), incremental (true there, false now)",
+        "time (was none, now 3.0), incremental (was true, now false)",
     );
     f.write("p.pcad", format!("{PROGRAM} // changed"));
     f.refuses(&base, "other settings: program");
@@ -294,9 +294,12 @@ fn what_is_no_dataset_leaves_nothing() {
     refuses(&f, "nowhere", "cannot read nowhere: ");
     refuses(&f, "data/a", "data/a: not a dataset");
     let d = f.run(&["evaluate", "p.pcad", "data/a", "--out", "out"]);
-    assert!(d.err.contains("hint: this is one case"), "{}", d.err);
+    assert!(d.err.contains("hint: this is a single case"), "{}", d.err);
     f.refuses(&["evaluate", "p.pcad", "data", "--out", "out", "--only", "aa"], "data: there is no case \"aa\"");
-    f.refuses(&["evaluate", "p.pcad", "data", "--out", "data"], "data is not empty and no folder of an evaluation");
+    f.refuses(
+        &["evaluate", "p.pcad", "data", "--out", "data"],
+        "data is not empty and is not the folder of an evaluation",
+    );
     f.refuses(&["evaluate", "p.pcad", "data", "--out", "out", "--set", "x=1"], "x");
     f.refuses(&["evaluate", "coin.pcad", "data", "--out", "out"], "the program observes no item of kind `image`");
     let people = |text: &str| {

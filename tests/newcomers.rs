@@ -111,7 +111,7 @@ fn zeros_and_ones_are_truth_values() {
     }
     f.write("bits.pcad", program("observe flip(p) = [1, 0, 2, 1];"));
     let d = f.run(&["run", "bits.pcad", "--out", "no"]);
-    assert!(d.code == 1 && d.err.contains("2 is observed"), "{}", d.err);
+    assert!(d.code == 1 && d.err.contains("the observed value 2 is outside the support"), "{}", d.err);
 }
 
 /// What no choice can give is named, with its place and the support.

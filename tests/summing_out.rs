@@ -224,7 +224,7 @@ fn what_cannot_be_summed_out_is_an_error() {
     for (program, says) in [
         (
             "assume z ~ flip(0.4); let m = if z { a ~ normal(0, 1); a } else { b ~ normal(3, 1); b };",
-            "appear or vanish",
+            "other choices are created or removed with it",
         ),
         ("assume n ~ poisson(2); let m = n; assume z ~ flip(0.5);", "finitely many values"),
         (

@@ -388,7 +388,7 @@ fn surrogates_are_not_part_of_the_joint() {
     assert!((got - expected).abs() < 1e-12, "{got} {expected}");
 }
 
-/// Runaway recursion and values that need themselves are errors, not crashes.
+/// Runaway recursion and values that depend on themselves are errors, not crashes.
 #[test]
 fn runaway_programs_are_stopped() {
     let fails = |text: &str| {
@@ -397,7 +397,10 @@ fn runaway_programs_are_stopped() {
         e.unwrap_or_else(|| panic!("{text} runs")).to_string()
     };
     assert!(fails("fn f(x) { 1 + f(x) } observe normal(f(0), 1) = 0;").contains("nested more than"));
-    assert!(fails("for t in 0 .. 3 { s[t] ~ normal(s[t], 1); observe normal(s[t], 1) = 0; }").contains("needs"));
+    assert!(
+        fails("for t in 0 .. 3 { s[t] ~ normal(s[t], 1); observe normal(s[t], 1) = 0; }")
+            .contains("depends on its own value")
+    );
     assert!(fails("for i in 0 .. 3 { t[1] ~ normal(0, 1); } observe normal(t[1], 1) = 0;").contains("twice"));
 }
 

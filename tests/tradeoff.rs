@@ -67,7 +67,7 @@ fn more_draws_are_nearer_to_the_reference() {
     let (set, chains, said) = run(&["--quality", "accurate"]);
     assert_eq!((set, chains), (json!({ "n": "20000" }), json!(2)));
     assert!(
-        said.contains("note: --quality accurate: --set n=20000 --chains 2, of mean.quality.json (error 0."),
+        said.contains("note: --quality accurate: --set n=20000 --chains 2, from mean.quality.json (error 0."),
         "{said}"
     );
     assert_eq!(run(&["--quality", "accurate", "--set", "n=10"]).0, json!({ "n": "10" }));

@@ -70,9 +70,9 @@ pub struct Given {
     /// The camera, a JSON file; by default a view 4.4 units across at distance 8
     #[arg(long, value_name = "FILE")]
     pub camera: Option<PathBuf>,
-    /// The contour detector to use instead of colour gradients: a structured forest (model.yml.gz)
-    /// or, if this build supports it, a network (.onnx). Options follow the file name, as in a
-    /// program's `detector`: 'net.onnx, colours = "bgr", white = 255'
+    /// A contour detector to replace colour gradients: a structured forest (model.yml.gz) or, if
+    /// this build supports it, a network (.onnx). Options follow, as in a program's `detector`:
+    /// 'net.onnx, colours = "bgr", white = 255'
     #[arg(long, value_name = "FILE[,OPTION=VALUE…]")]
     pub edges: Option<String>,
     /// Whom it is about
@@ -89,8 +89,7 @@ pub struct Allowed {
     /// A folder the program may read files from, besides its own; may be repeated
     #[arg(long, value_name = "DIR")]
     pub allow_read: Vec<PathBuf>,
-    /// Change a limit on the size of the program's evaluation: depth, nodes, elements or
-    /// operations; may be repeated
+    /// Change a limit on evaluation: depth, nodes, elements or operations; may be repeated
     #[arg(long = "limit", value_name = "NAME=N", value_parser = limit)]
     pub limits: Vec<(String, u64)>,
 }
@@ -131,12 +130,11 @@ pub struct Sampling {
     /// Kernel applications per chain in warm-up, overriding the program's
     #[arg(long)]
     pub warmup: Option<u64>,
-    /// A measured preset of the speed-accuracy trade-off, if the program has presets; `own` uses
-    /// the program's own settings
+    /// A measured preset of speed and accuracy; `own` uses the program's own settings
     #[arg(long, value_parser = QualityArg::parser())]
     pub quality: Option<QualityArg>,
-    /// The total time (for a dataset: per case), such as 10s, 2m or 500ms; at most half of it is
-    /// warm-up. Uses the measured preset for that time, unless --quality is given
+    /// The total time (of a dataset: per case), such as 10s, 2m or 500ms; at most half is warm-up.
+    /// Selects the measured preset for that time, unless --quality is given
     #[arg(long, value_parser = duration)]
     pub time: Option<Duration>,
     /// Re-run the whole program at each step: the same draws, but slow; for testing the engine
@@ -161,14 +159,14 @@ pub struct Job {
     #[command(flatten)]
     pub given: Given,
     /// A file for a `data` item, or FILE#ID for one entry of a JSON file; the name may be omitted
-    /// if only one item accepts the file
+    /// if only one item fits
     #[arg(long, value_name = "[NAME=]FILE")]
     pub observe: Vec<String>,
     /// A contour map (bright pixels are contour) to use instead of the photograph's own contours
     #[arg(long, value_name = "FILE")]
     pub observe_contours: Option<PathBuf>,
-    /// The keypoints found by a pose detector: a file for the program's one keypoints `data` item.
-    /// `#ID` selects one of several people; without it, the entry named after the photograph's file
+    /// Keypoints from a pose detector: a file for the program's one keypoints `data` item. `#ID`
+    /// selects one of several people [default: the entry named after the photograph's file]
     #[arg(long, value_name = "FILE[#ID]")]
     pub keypoints: Option<String>,
     /// The command that computes the photograph's features, for a bank that was made with it
@@ -195,14 +193,14 @@ pub struct Run {
     /// The folder for results [default: runs/PROG]
     #[arg(long, value_name = "DIR")]
     pub out: Option<PathBuf>,
-    /// Resume the run that the same command began in this folder, or begin it if there is none.
-    /// `--steps` and `--time` may be larger than before
+    /// Resume the run that the same command began in this folder, if there is one; `--steps` and
+    /// `--time` may be larger than before
     #[arg(long)]
     pub resume: bool,
     /// The time between checkpoints, from which an interrupted run resumes
     #[arg(long, value_parser = duration, default_value = "10s", value_name = "TIME")]
     pub checkpoint: Duration,
-    /// How many complete states to keep for `show`, evenly spaced, over all chains together
+    /// How many complete states to keep for `show`, evenly spaced, over all chains
     #[arg(long, default_value_t = 100, value_name = "N", value_parser = clap::value_parser!(u32).range(..=100_000))]
     pub keep: u32,
     /// Also report what was modelled, proposed, redrawn and skipped, and why
@@ -232,7 +230,7 @@ pub struct Evaluate {
     /// The folder for results: one run folder per case, and summaries
     #[arg(long, value_name = "DIR")]
     pub out: PathBuf,
-    /// Detected keypoints, JSON keyed by case; a case without keypoints runs on its picture alone
+    /// Detected keypoints, JSON keyed by case; cases without any run on their picture alone
     #[arg(long, value_name = "FILE")]
     pub keypoints: Option<PathBuf>,
     /// Only these cases
@@ -241,7 +239,7 @@ pub struct Evaluate {
     /// Seed, chains, steps, time
     #[command(flatten)]
     pub sampling: Sampling,
-    /// Redo all cases; otherwise completed cases are kept, and changed settings are an error
+    /// Redo all cases; otherwise completed ones are kept, and changed settings are an error
     #[arg(long)]
     pub fresh: bool,
     /// Print the summary as JSON
@@ -272,8 +270,7 @@ pub struct Tradeoff {
     /// The cases: one folder each, with the observed data and the ground truth
     #[arg(long, value_name = "DIR")]
     pub cases: PathBuf,
-    /// The settings to try, a JSON file; may be repeated [default: PROG with the extension
-    /// .settings.json]
+    /// The settings to try, a JSON file; may be repeated [default: PROG.settings.json]
     #[arg(long, value_name = "FILE")]
     pub settings: Vec<PathBuf>,
     /// Detected keypoints for the cases: {CASE: {"keypoints": {NAME: [x, y, …], …}}, …}
@@ -282,8 +279,8 @@ pub struct Tradeoff {
     /// The folder for results; results already there are reused
     #[arg(long, value_name = "DIR", default_value = "tradeoff")]
     pub out: PathBuf,
-    /// The total time, including earlier calls with the same folder; if it is short, settings that
-    /// do badly on a few cases are dropped from the rest
+    /// The total time, earlier calls with the same folder included; if it is short, settings that
+    /// do badly on a few cases are dropped
     #[arg(long, value_parser = duration, default_value = "1h")]
     pub budget: Duration,
     /// Runs of each setting on each case
@@ -298,8 +295,8 @@ pub struct Tradeoff {
     /// The number of concurrent runs [default: as many as the hardware threads allow]
     #[arg(long, value_parser = clap::value_parser!(u32).range(1..=1024))]
     pub jobs: Option<u32>,
-    /// Also write the Pareto front to this file; named PROG with the extension .quality.json, it
-    /// supplies the presets of `run --quality` and `--time`
+    /// Also write the Pareto front to this file; as PROG.quality.json it has the presets for `run
+    /// --quality` and `--time`
     #[arg(long, value_name = "FILE")]
     pub presets: Option<PathBuf>,
     /// Discard earlier results and measure everything again
@@ -363,9 +360,8 @@ pub struct Learn {
     /// The features that pictures are compared by
     #[arg(long, value_enum, default_value_t = FeatureKind::Contours)]
     pub features: FeatureKind,
-    /// A command that prints a picture's features, instead of the built-in ones: the same number of
-    /// values for every picture. {png} stands for the picture's file; the command is not run by a
-    /// shell
+    /// A command that prints a picture's features, equally many for all. {png} is replaced by the
+    /// picture's file; no shell is used
     #[arg(long, value_name = "CMD", conflicts_with = "features")]
     pub features_from: Option<String>,
     /// The longer side of the pictures that features are computed from, in pixels
@@ -395,11 +391,10 @@ pub struct Check {
     /// Check again whenever a source file changes, until interrupted
     #[arg(long, conflicts_with_all = ["sbc", "geweke"])]
     pub watch: bool,
-    /// Simulation-based calibration: run the plan on simulated data and rank the true values among
-    /// the draws
+    /// Simulation-based calibration: rank the true values of simulated data among the draws
     #[arg(long)]
     pub sbc: bool,
-    /// Geweke's test: alternate the plan with simulating data, and compare the draws with the prior
+    /// Geweke's test: alternate updates and simulated data, and compare with the prior
     #[arg(long)]
     pub geweke: bool,
     /// The number of data sets for --sbc [default: 200], of chains for --geweke [default: 100]
@@ -427,10 +422,9 @@ pub struct Check {
 
 /// What the two checks are.
 const CHECKS: &str = "\
-With --sbc or --geweke, data are simulated from the program itself, so every observation needs a sampler:
-all distributions have one, and so have scene.mask, scene.depth, scene.keypoints and scene.region (with one
-power 1 and the other 0). Exit code 1 if a quantity fails, or if the program cannot be simulated. A correct
-plan fails by chance once in 1000.";
+With --sbc or --geweke, data are simulated from the program, so every observation needs a sampler: all
+distributions have one, and scene.mask, scene.depth, scene.keypoints and scene.region (powers 1 and 0). Exit
+code 1 if a quantity fails or the program cannot be simulated. A correct plan fails once in 1000 by chance.";
 
 /// `predict`.
 #[derive(Args, Debug)]
@@ -458,13 +452,12 @@ pub struct Contours {
     /// The contour map to write
     #[arg(short, long, value_name = "FILE", default_value = "contours.png")]
     pub out: PathBuf,
-    /// The longer side in pixels at which contours are detected [default: 256; with --edges 512, at
-    /// most 2048]
+    /// The longer side in pixels at which contours are detected [default: 256; with --edges 512]
     #[arg(long, value_parser = clap::value_parser!(u32).range(8..=8192))]
     pub size: Option<u32>,
-    /// The contour detector to use instead of colour gradients: a structured forest (model.yml.gz)
-    /// or, if this build supports it, a network (.onnx). Options follow the file name, as in a
-    /// program's `detector`: 'net.onnx, colours = "bgr", white = 255'
+    /// A contour detector to replace colour gradients: a structured forest (model.yml.gz) or, if
+    /// this build supports it, a network (.onnx). Options follow, as in a program's `detector`:
+    /// 'net.onnx, colours = "bgr", white = 255'
     #[arg(long, value_name = "FILE[,OPTION=VALUE…]")]
     pub edges: Option<String>,
 }
@@ -485,7 +478,7 @@ pub struct Fmt {
     /// Programs, or folders containing programs
     #[arg(value_name = "FILE", value_hint = ValueHint::AnyPath, required_unless_present = "stdin")]
     pub paths: Vec<PathBuf>,
-    /// Change nothing; list the files that would change, and exit with code 1 if there are any
+    /// Only list the files that would change, and exit with code 1 if there are any
     #[arg(long)]
     pub check: bool,
     /// Read a program from standard input and write it to standard output
@@ -507,10 +500,10 @@ pub struct Repl {
     /// The camera, a JSON file
     #[arg(long, value_name = "FILE", requires = "program")]
     pub camera: Option<PathBuf>,
-    /// A file for a `data` item; the name may be omitted if only one item accepts the file
+    /// A file for a `data` item; the name may be omitted if only one item fits
     #[arg(long, value_name = "[NAME=]FILE", requires = "program")]
     pub observe: Vec<String>,
-    /// The keypoints found by a pose detector: a file for the program's one keypoints `data` item
+    /// Keypoints from a pose detector: a file for the program's one keypoints `data` item
     #[arg(long, value_name = "FILE[#ID]", requires = "program")]
     pub keypoints: Option<String>,
     /// What the program may read and build
