@@ -156,7 +156,7 @@ fn banks_that_do_not_fit_are_refused() {
     let mut other = whole.clone();
     other[8] = 99;
     f.write("small.bank", &other);
-    refused(&f, "version 99 of the format");
+    refused(&f, "format version 99");
     for n in [whole.len() - 1, whole.len() / 2, 70, 20] {
         f.write("small.bank", &whole[..n]);
         refused(&f, "damaged");

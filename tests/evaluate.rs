@@ -247,7 +247,7 @@ fn other_settings_are_an_error_that_names_them() {
         "time (was none, now 3.0), incremental (was true, now false)",
     );
     f.write("p.pcad", format!("{PROGRAM} // changed"));
-    f.refuses(&base, "other settings: program");
+    f.refuses(&base, "different settings: program");
     f.write("p.pcad", PROGRAM).write("data/b/image.png", picture(5.0));
     f.refuses(&base, "out/b was run with different settings: picture, camera or keypoints");
     let old = draws(&f, "out/b");
