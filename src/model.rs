@@ -127,7 +127,7 @@ impl Model {
         let d = match e {
             ChainError::Run(e) | ChainError::Start(StartError::Run(e)) => e.into_diagnostic(),
             ChainError::Start(StartError::Impossible(zero)) => {
-                let mut d = plain(format!("no chain can start: {zero}"));
+                let mut d = plain(format!("cannot start any chain: {zero}"));
                 for (i, term) in zero.terms.iter().take(5).enumerate() {
                     let why = term.outside.as_ref().map(|why| format!(": {why}")).unwrap_or_default();
                     d = match i {
@@ -140,15 +140,21 @@ impl Model {
                 }
                 if !zero.drawn.is_empty() {
                     let drawn: Vec<String> = zero.drawn.iter().map(|(a, v)| format!("{a} = {v}")).collect();
-                    d = d.note(format!("in the last of them {}", drawn.join(", ")));
+                    d = d.note(format!("in the last draw, {}", drawn.join(", ")));
                 }
                 d.hint(match zero.terms.first().is_some_and(|t| t.outside.is_some()) {
-                    true => "check the data, or observe them under a distribution that can give them, in some state at least",
-                    false => "widen the prior or the spread of what is observed; a factor of -inf rules a state out",
+                    true => {
+                        "check the data, or observe them under a distribution whose support \
+                             contains them"
+                    }
+                    false => {
+                        "use a wider prior or a wider likelihood; a factor of -inf excludes \
+                              a state"
+                    }
                 })
             }
-            ChainError::Sink(e) => plain(format!("draws cannot be written: {e}")),
-            ChainError::Checkpoint(e) => plain(format!("a chain cannot go on: {e}")),
+            ChainError::Sink(e) => plain(format!("cannot write draws: {e}")),
+            ChainError::Checkpoint(e) => plain(format!("cannot resume a chain: {e}")),
         };
         Error { diagnostics: vec![d], sources: self.sources.clone() }
     }
@@ -207,8 +213,12 @@ impl Model {
         sinks: Vec<Box<dyn Sink>>,
     ) -> Result<Vec<Result<ChainResult, ChainError>>, Error> {
         if options.time.is_some() && !clock::RUNS {
-            let d = Diagnostic::new(Severity::Error, "there is no clock on this platform, so a run cannot end by time");
-            return Err(Error { diagnostics: vec![d.hint("bound it by `steps`")], sources: self.sources.clone() });
+            let d = Diagnostic::new(
+                Severity::Error,
+                "this platform has no clock, so a run cannot \
+                have a time limit",
+            );
+            return Err(Error { diagnostics: vec![d.hint("limit it by `steps`")], sources: self.sources.clone() });
         }
         let (plan, _) = self.plan()?;
         Ok(run_chains(self.code(), &plan, options, threads, progress, sinks))

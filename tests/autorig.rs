@@ -165,7 +165,7 @@ fn meshes_that_cannot_be_rigged_are_named_with_what_can_be_done() {
     };
     run("groups", "needs 2 to 256 groups in the mesh; it has 1");
     let d = f.run(&["run", "p.pcad", "--quiet"]);
-    assert!(d.err.contains("hint: for a mesh of one piece there is `from = \"skeleton\"`"), "{}", d.err);
+    assert!(d.err.contains("hint: for a mesh in one piece use `from = \"skeleton\"`"), "{}", d.err);
     run("skeleton", "a skeleton needs a closed mesh; this one has 3 open edges");
     run("skin", "one of \"groups\", \"skeleton\"");
 }

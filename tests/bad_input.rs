@@ -55,7 +55,7 @@ fn pictures_that_are_none() {
         .write("lie.png", claims(9000, 9000));
     std::fs::create_dir(f.path().join("folder.png")).unwrap();
     for (file, says) in [
-        ("missing.png", "cannot read missing.png: there is no such file"),
+        ("missing.png", "cannot read missing.png: no such file"),
         ("empty.png", "empty.png"),
         ("cut.png", "cut.png"),
         ("head.png", "head.png"),
@@ -112,7 +112,7 @@ fn cameras_that_are_none() {
 fn meshes_that_are_none() {
     let f = Folder::new("meshes");
     f.write("p.pcad", MESH);
-    f.refuses(&run(&[]), "cannot read x.obj: there is no such file");
+    f.refuses(&run(&[]), "cannot read x.obj: no such file");
     for (text, says) in [
         ("", "no faces"),
         ("v 0 0 0\nv 1 nan 0\nv 0 1 0\nf 1 2 3\n", "line 2"),
@@ -121,7 +121,7 @@ fn meshes_that_are_none() {
         ("v 0 0 0\nv 1 0 0\nv 0 1 0\nf 0 1 2\n", "line 4"),
         ("v 0 0 0\nv 1 0 0\nv 0 1 0\nf -4 1 2\n", "line 4"),
         ("v 0 0 0\nv 1 0 0\nv 0 1 0\nf 99999999999999999999 1 2\n", "line 4"),
-        ("v 0 0 0\nv 0 0 0\nv 0 0 0\nf 1 2 3\n", "no triangle with an area"),
+        ("v 0 0 0\nv 0 0 0\nv 0 0 0\nf 1 2 3\n", "have zero area"),
         ("hello\n", "no faces"),
     ] {
         f.write("x.obj", text);
@@ -164,7 +164,7 @@ fn objects_out_of_view() {
 #[test]
 fn programs_that_are_none() {
     let f = Folder::new("programs");
-    f.refuses(&["run", "missing.pcad"], "cannot read missing.pcad: there is no such file");
+    f.refuses(&["run", "missing.pcad"], "cannot read missing.pcad: no such file");
     f.refuses(&["check", "missing.pcad"], "cannot read missing.pcad");
     std::fs::create_dir(f.path().join("p.pcad")).unwrap();
     f.refuses(&run(&[]), "it is a folder");
@@ -178,9 +178,9 @@ fn programs_that_are_none() {
     f.write("p.pcad", "include \"part.pcad\" as part; assume x ~ normal(0, 1);");
     f.refuses(&run(&[]), "part.pcad");
     f.write("p.pcad", "include \"p.pcad\" as me; assume x ~ normal(0, 1);");
-    f.refuses(&run(&[]), "circle");
+    f.refuses(&run(&[]), "cycle");
     f.write("p.pcad", "include \"./p.pcad\" as me; assume x ~ normal(0, 1);");
-    f.refuses(&run(&[]), "circle");
+    f.refuses(&run(&[]), "cycle");
 }
 
 /// An empty program is no mistake; it has nothing to say.
@@ -258,7 +258,7 @@ fn settings_that_are_none() {
     f.refuses(&q("n=(1"), "");
     f.refuses(&q("n="), "");
     f.refuses(&q("n=-3"), "");
-    f.refuses(&["run", "q.pcad", "--observe", "x.png"], "observes no data");
+    f.refuses(&["run", "q.pcad", "--observe", "x.png"], "has no `data` items");
     f.write(
         "two.pcad",
         "include \"std/scene.pcad\" as scene; data a: image; data b: image; assume r ~ uniform(0.3, 1);

@@ -141,22 +141,22 @@ fn entries_come_back_and_the_nearest_picture_of_an_entry_is_its_own() {
 #[test]
 fn banks_that_do_not_fit_are_refused() {
     let f = small("bank_refused");
-    refused(&f, "small.bank cannot be read: there is no such file");
+    refused(&f, "small.bank: no such file");
     f.write("small.bank", "not a bank");
-    refused(&f, "it is no bank");
+    refused(&f, "it is not a bank");
     f.succeeds(&LEARN);
     f.succeeds(&[&RUN[..], &["--quiet"]].concat());
     let whole = std::fs::read(f.path().join("small.bank")).unwrap();
     // Another program, in text or parameters.
-    refused_with(&f, &["--set", "sides=13"], "learnt from another program");
+    refused_with(&f, &["--set", "sides=13"], "made from another program");
     f.write("small.pcad", SMALL.replace("0.8, 3", "0.8, 4"));
-    refused(&f, "learnt from another program");
+    refused(&f, "made from another program");
     f.write("small.pcad", SMALL);
     // Another version, a file cut short, a header that was changed.
     let mut other = whole.clone();
     other[8] = 99;
     f.write("small.bank", &other);
-    refused(&f, "version 99 of the format");
+    refused(&f, "format version 99");
     for n in [whole.len() - 1, whole.len() / 2, 70, 20] {
         f.write("small.bank", &whole[..n]);
         refused(&f, "damaged");
@@ -165,10 +165,10 @@ fn banks_that_do_not_fit_are_refused() {
     let at = other.len() - 10;
     other[at] ^= 1;
     f.write("small.bank", &other);
-    refused(&f, "header was changed");
+    refused(&f, "header is altered");
     // Features of what is not observed.
     f.write("bare.pcad", "assume x ~ normal(0, 1); observe normal(x, 1) = 0;");
-    f.refuses(&["learn", "bare.pcad", "-o", "bare.bank"], "the program has no picture");
+    f.refuses(&["learn", "bare.pcad", "-o", "bare.bank"], "the program has nothing to draw");
     f.refuses(&["learn", "small.pcad", "-o", "k.bank", "--features", "keypoints"], "no landmarks");
     f.refuses(&["learn", "small.pcad", "-o", "no/such/folder.bank"], "cannot write no/such/folder.bank");
 }

@@ -160,7 +160,7 @@ fn a_coarse_first_stage_leaves_the_posterior_as_it_is() {
 fn a_trace_says_what_is_approximate() {
     let model = model("scene.chamfer(view, sigma = 1, size = 48)", WALKS, 1);
     let trace = model.simulate(1, 0).unwrap_or_else(|e| panic!("{e}"));
-    assert_eq!(trace.approximations(), ["scene.chamfer: drawn at 48 pixels in single precision"]);
+    assert_eq!(trace.approximations(), ["scene.chamfer: rendered at 48 pixels in single precision"]);
 }
 
 #[test]

@@ -250,7 +250,7 @@ fn predictive_checks() {
     assert!(prior.out.contains("50 draws from the prior") && f.read("c/predictive.csv").lines().count() == 51);
     f.write("soft.pcad", "assume x ~ normal(0, 1); factor(-x * x) as soft;");
     let soft = f.run(&["predict", "soft.pcad", "--prior"]);
-    assert!(soft.code == 1 && soft.err.contains("no observation of the program has a sampler"), "{}", soft.err);
+    assert!(soft.code == 1 && soft.err.contains("none of the program's observations has a sampler"), "{}", soft.err);
 }
 
 /// Exit code 2 is for what the command line itself gets wrong.
@@ -448,7 +448,7 @@ fn modes_that_chains_stay_in_are_shown() {
         let agreement: serde_json::Value = serde_json::from_str(&f.read(&format!("{name}/run.json"))).unwrap();
         (
             agreement["agreement"].as_f64().unwrap(),
-            f.read(&format!("{name}/summary.json")).contains("cover the same pixels"),
+            f.read(&format!("{name}/summary.json")).contains("of the pixels they cover"),
         )
     };
     let (far, near) = (run("far", "1.5"), run("near", "0.0001"));

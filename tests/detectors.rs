@@ -116,7 +116,7 @@ fn mistakes_are_shown() {
         ("detector(\"model.yml\", logits = true)", "a structured forest has no options"),
         ("detector(\"net.onnx\", spread = 0)", "`spread` must be above 0"),
         ("detector(\"net.onnx\", output = 0)", "`output` must be a name in quotes or a number from 1"),
-        ("detector(\"net.onnx\", mean = [1, 2])", "`mean` must be a number or a list of three"),
+        ("detector(\"net.onnx\", mean = [1, 2])", "`mean` must be a literal number or a list of three"),
         ("detector(\"net.onnx\", colours = \"grey\")", "`colours` must be \"rgb\" or \"bgr\""),
         ("detector(\"net.onnx\", white = 1, white = 2)", "`white` is given twice"),
         ("detector(\"net.onnx\", size = 2)", "detector has no option `size`"),
@@ -151,7 +151,7 @@ fn the_command_takes_a_detector() {
     assert_ne!(draws("a"), draws("b"));
     assert_eq!(draws("b"), draws("c"), "the same forest, packed and not");
     f.refuses(&[&run[..], &["--out", "d", "--edges", "model.yml, colours = 3"]].concat(), "must be \"rgb\" or \"bgr\"");
-    f.refuses(&[&run[..], &["--out", "d", "--edges", "model.yml, bgr"]].concat(), "options are given by name");
+    f.refuses(&[&run[..], &["--out", "d", "--edges", "model.yml, bgr"]].concat(), "give options by name");
     f.refuses(
         &[&run[..], &["--out", "d", "--edges", "model.yml, bgr); data e = csv(\"x\""]].concat(),
         "options of a detector",

@@ -120,7 +120,7 @@ fn errors_say_what_was_expected() {
     let e = error(
         "assume x ~ flat(); assume y ~ normal(0, 1); observe normal(y, 1) = 0; infer { repeat 1 { collect x; } }",
     );
-    assert!(e.contains("`flat` is improper: it cannot be drawn from"), "{e}");
+    assert!(e.contains("`flat` is improper, so it cannot be sampled"), "{e}");
     let e = error("observe mixture([1, 1], [normal(0, 1), 3]) = 0;");
     assert!(e.contains("mixture: `components` must be an array of distributions"), "{e}");
     let e = error("observe ordered(poisson(1), 2) = [0, 1];");

@@ -149,7 +149,7 @@ fn a_kernel_of_the_host_applies_another() {
         }
     }
     let twice = Entry::kernel("twice", |call: &mut pcadlang::host::KernelCall| Ok(Twice(call.kernel(0)?)));
-    let host = Host::new().with(twice.argument("move", Type::Kernel, "The kernel inside."));
+    let host = Host::new().with(twice.argument("move", Type::Kernel, "The inner kernel."));
     let text = "assume x ~ normal(0, 1); observe normal(x, 1) = 1; infer { repeat 100 { twice(mh(@x)); } }";
     let model = Program::parse(text).unwrap().host(&host).unwrap().compile().unwrap();
     assert_eq!(model.run(&RunOptions::default(), 1, 1).unwrap().chains[0].kernels[0].proposals, 200);
@@ -217,12 +217,12 @@ fn names_that_clash_or_are_none_are_errors() {
     let e = Program::parse("").unwrap().host(&host).err().unwrap();
     let text = e.to_string();
     for part in [
-        "`normal` is a name of the language",
-        "`if` cannot be the name",
-        "`two words` cannot be the name",
-        "the host brings `mine` twice",
-        "`pi` is a name of the language",
-        "`f`: `b` must be given",
+        "`normal` is a built-in of the language",
+        "`if` is not a valid name",
+        "`two words` is not a valid name",
+        "the host registers `mine` twice",
+        "`pi` is a built-in of the language",
+        "`f`: the required argument `b` must come before",
         "`d`: only functions take a gradient",
     ] {
         assert!(text.contains(part), "{part}: {text}");

@@ -85,10 +85,10 @@ phase!(type_errors, "type/*.pcad", compiling);
 phase!(runtime_errors, "runtime/*.pcad", running);
 
 const PHASES: [(&str, &str, Diagnose); 4] = [
-    ("parse", "What does not read as a program", parsing),
-    ("name", "Names, arguments, and what stands where it cannot", compiling),
-    ("type", "Values of the wrong type", compiling),
-    ("runtime", "What shows only in a run", running),
+    ("parse", "Syntax errors", parsing),
+    ("name", "Names, arguments, and misplaced statements", compiling),
+    ("type", "Type errors", compiling),
+    ("runtime", "Errors during a run", running),
 ];
 
 /// `REGENERATE=1 cargo test --test errors` rewrites the catalogue.
@@ -96,8 +96,8 @@ const PHASES: [(&str, &str, Diagnose); 4] = [
 fn the_catalogue_is_up_to_date() {
     let root = Path::new(env!("CARGO_MANIFEST_DIR"));
     let mut text = String::from(
-        "# Mistakes and what is said of them\n\nEach program of `programs/errors` has one kind of mistake. Below it is what `pcadlang` says; \
-         the tests keep it so. `REGENERATE=1 cargo test --test errors` writes this page.\n",
+        "# Mistakes and their messages\n\nEach program in `programs/errors` has one kind of mistake, followed here by the message of \
+         `pcadlang`.\n`REGENERATE=1 cargo test --test errors` writes this page, and the tests keep it up to date.\n",
     );
     for (phase, title, diagnose) in PHASES {
         text += &format!("\n## {title}\n");

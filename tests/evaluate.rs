@@ -83,7 +83,7 @@ fn a_folder_for_each_case() {
     let d = evaluate(&f, &["data", "--out", "out"]);
     assert_eq!(d.code, 0, "{}", d.err);
     let said: Vec<&str> = d.err.lines().collect();
-    assert_eq!(said[0], "note: notes has no image and is left out");
+    assert_eq!(said[0], "note: notes has no image and is skipped");
     assert!(said[1].starts_with("1/2 a: ") && said[1].contains("draws"), "{}", d.err);
     assert!(said[2].starts_with("2/2 b: ") && said.len() == 3, "{}", d.err);
     assert_eq!(d.out, f.read("out/table.md"));
@@ -186,7 +186,7 @@ fn keypoints_of_a_detector() {
     let args =
         ["evaluate", "d.pcad", "people", "--keypoints", "found.json", "--steps", "20", "--chains", "1", "--out", "out"];
     let d = f.succeeds(&args);
-    assert!(d.err.contains("note: nobody was detected in two: it runs on its picture alone"), "{}", d.err);
+    assert!(d.err.contains("note: no keypoints for two: it runs on its picture alone"), "{}", d.err);
     assert!(!d.err.contains("detected in one"), "{}", d.err);
     let x = |case: &str| json_of(&f, &format!("out/{case}/summary.json"))["quantities"]["x"]["mean"].as_f64().unwrap();
     assert!((x("one") - 41.5).abs() < 1e-3 && x("two").abs() < 1e-3, "{} {}", x("one"), x("two"));
@@ -194,15 +194,15 @@ fn keypoints_of_a_detector() {
     assert_eq!(run["observe"], json!(["photo=people/one.png", "keypoints=found.json#one"]));
     // Another person in the file changes nothing for this one.
     f.write("found.json", r#"{"one": {"keypoints": {"hip": [41.5, 3]}, "seconds": 1}, "three": {}}"#);
-    assert!(f.succeeds(&args).err.contains("1/2 two: done before\n2/2 one: done before"));
+    assert!(f.succeeds(&args).err.contains("1/2 two: already done\n2/2 one: already done"));
     f.write("found.json", r#"{"one": {"keypoints": {"hip": [0, 3]}}}"#);
-    f.refuses(&args, "one was run with other settings: picture, camera or keypoints");
+    f.refuses(&args, "one was run with different settings: picture, camera or keypoints");
     f.refuses(
         &["evaluate", "p.pcad", "people", "--keypoints", "found.json", "--out", "x"],
         "no item of kind `keypoints`",
     );
     f.write("found.json", "[]");
-    f.refuses(&args, "found.json: expected an object with an entry for each case");
+    f.refuses(&args, "found.json: expected a JSON object with one entry per case");
 }
 
 #[test]
@@ -213,11 +213,11 @@ fn what_is_done_is_not_done_again() {
     assert_eq!(evaluate(&f, &["data", "--out", "out", "--only", "b"]).code, 0);
     let table = f.read("out/table.md");
     assert!(table.contains("| b ") && !table.contains("| a "), "{table}");
-    assert!(evaluate(&f, &all).err.contains("2/2 b: done before"));
+    assert!(evaluate(&f, &all).err.contains("2/2 b: already done"));
     let (before, files) = (f.read("out/evaluation.json"), f.files());
     let times = ["out/a/run.json", "out/b/run.json"].map(|n| modified(&f, n));
     let d = evaluate(&f, &all);
-    assert!(d.err.ends_with("1/2 a: done before\n2/2 b: done before\n") && d.code == 0, "{}", d.err);
+    assert!(d.err.ends_with("1/2 a: already done\n2/2 b: already done\n") && d.code == 0, "{}", d.err);
     assert_eq!((f.read("out/evaluation.json"), f.files()), (before, files));
     assert_eq!(["out/a/run.json", "out/b/run.json"].map(|n| modified(&f, n)), times);
     // One that is gone, and one that was stopped, are done again.
@@ -240,16 +240,16 @@ fn other_settings_are_an_error_that_names_them() {
     let base = ["evaluate", "p.pcad", "data", "--out", "out", "--steps", "20", "--warmup", "10", "--chains", "2"];
     f.succeeds(&base);
     let with = |more: &[&'static str]| base.iter().copied().chain(more.iter().copied()).collect::<Vec<_>>();
-    f.refuses(&with(&["--seed", "2"]), "out/a was run with other settings: seed (1 there, 2 now)");
+    f.refuses(&with(&["--seed", "2"]), "out/a was run with different settings: seed (was 1, now 2)");
     f.refuses(&with(&["--set", "sd=2"]), "program, --set");
     f.refuses(
         &with(&["--time", "3s", "--no-incremental"]),
-        "time (none there, 3.0 now), incremental (true there, false now)",
+        "time (was none, now 3.0), incremental (was true, now false)",
     );
     f.write("p.pcad", format!("{PROGRAM} // changed"));
-    f.refuses(&base, "other settings: program");
+    f.refuses(&base, "different settings: program");
     f.write("p.pcad", PROGRAM).write("data/b/image.png", picture(5.0));
-    f.refuses(&base, "out/b was run with other settings: picture, camera or keypoints");
+    f.refuses(&base, "out/b was run with different settings: picture, camera or keypoints");
     let old = draws(&f, "out/b");
     f.succeeds(&with(&["--fresh"]));
     assert_ne!(draws(&f, "out/b"), old);
@@ -274,7 +274,7 @@ fn a_case_that_fails_does_not_stop_the_rest() {
     // Mended, only that one is run.
     f.write("data/a/image.png", picture(9.0));
     let d = evaluate(&f, &["data", "--out", "out"]);
-    assert!(d.code == 0 && d.err.contains("2/2 b: done before"), "{}", d.err);
+    assert!(d.code == 0 && d.err.contains("2/2 b: already done"), "{}", d.err);
     assert!(f.exists("out/a/depth.npy"));
     // A wrong camera is a case's own too, and takes what an earlier run left with it.
     f.write("data/b/camera.json", "{}");
@@ -290,13 +290,16 @@ fn what_is_no_dataset_leaves_nothing() {
     let refuses =
         |f: &Folder, dataset: &str, says: &str| f.refuses(&["evaluate", "p.pcad", dataset, "--out", "out"], says);
     std::fs::create_dir(f.path().join("empty")).unwrap();
-    refuses(&f, "empty", "empty: no dataset is there");
+    refuses(&f, "empty", "empty: not a dataset");
     refuses(&f, "nowhere", "cannot read nowhere: ");
-    refuses(&f, "data/a", "data/a: no dataset is there");
+    refuses(&f, "data/a", "data/a: not a dataset");
     let d = f.run(&["evaluate", "p.pcad", "data/a", "--out", "out"]);
-    assert!(d.err.contains("hint: this is one case"), "{}", d.err);
+    assert!(d.err.contains("hint: this is a single case"), "{}", d.err);
     f.refuses(&["evaluate", "p.pcad", "data", "--out", "out", "--only", "aa"], "data: there is no case \"aa\"");
-    f.refuses(&["evaluate", "p.pcad", "data", "--out", "data"], "data is not empty and no folder of an evaluation");
+    f.refuses(
+        &["evaluate", "p.pcad", "data", "--out", "data"],
+        "data is not empty and is not the folder of an evaluation",
+    );
     f.refuses(&["evaluate", "p.pcad", "data", "--out", "out", "--set", "x=1"], "x");
     f.refuses(&["evaluate", "coin.pcad", "data", "--out", "out"], "the program observes no item of kind `image`");
     let people = |text: &str| {
@@ -305,14 +308,14 @@ fn what_is_no_dataset_leaves_nothing() {
     for (text, says) in [
         ("{", "annotations.json: EOF"),
         ("{\"images\": []}", "missing field `people`"),
-        ("{\"people\": []}", "empty: no dataset is there"),
+        ("{\"people\": []}", "empty: not a dataset"),
         ("{\"people\": [{\"id\": 3, \"image\": \"x.png\"}]}", "expected a string"),
-        ("{\"people\": [{\"id\": \"a\", \"image\": \"../x.png\"}]}", "is no file beside it"),
-        ("{\"people\": [{\"id\": \"../a\", \"image\": \"x.png\"}]}", "cannot be the name of a folder"),
-        ("{\"people\": [{\"id\": \"table.md\", \"image\": \"x.png\"}]}", "cannot be the name of a folder"),
+        ("{\"people\": [{\"id\": \"a\", \"image\": \"../x.png\"}]}", "is not a file in the same folder"),
+        ("{\"people\": [{\"id\": \"../a\", \"image\": \"x.png\"}]}", "cannot be used as a folder name"),
+        ("{\"people\": [{\"id\": \"table.md\", \"image\": \"x.png\"}]}", "cannot be used as a folder name"),
         (
             "{\"people\": [{\"id\": \"a\", \"image\": \"x\"}, {\"id\": \"a\", \"image\": \"y\"}]}",
-            "the case a is there twice",
+            "the case a occurs twice",
         ),
     ] {
         people(text);
@@ -356,7 +359,11 @@ fn an_interrupted_evaluation_goes_on_later() {
     // Other settings than those of a case that was begun are an error too.
     let d = evaluate(&f, &["data", "--out", "out"]);
     assert!(
-        d.code == 1 && d.err.contains("out/a was run with other settings: steps (none there, 20 now)"),
+        d.code == 1
+            && d.err.contains(
+                "out/a was run with different settings: steps (was none, \
+                                       now 20)"
+            ),
         "{}",
         d.err
     );

@@ -141,7 +141,7 @@ fn strips_fans_and_the_rest() {
     let (w, d) = square(1, &[]);
     assert_eq!(read(&glb(w, d)).unwrap_err(), "the scene of the glTF file has no triangles");
     let (w, d) = square(9, &[]);
-    assert_eq!(read(&glb(w, d)).unwrap_err(), "mesh `sq` is drawn in mode 9, which glTF does not have");
+    assert_eq!(read(&glb(w, d)).unwrap_err(), "mesh `sq` has mode 9, which glTF does not define");
     let (w, d) = square(4, &[0, 1, 9]);
     assert_eq!(read(&glb(w, d)).unwrap_err(), "mesh `sq` uses vertex 9, but it has 4");
 
@@ -170,9 +170,9 @@ fn buffers_lie_anywhere() {
     d["buffers"][0]["uri"] = format!("data:application/octet-stream;base64,{}", files::base64(&bytes)).into();
     assert_eq!(read(d.to_string().as_bytes()).unwrap(), inside);
     d["buffers"][0]["uri"] = "https://example.org/a.bin".into();
-    assert!(read(d.to_string().as_bytes()).unwrap_err().ends_with("only files are read"));
+    assert!(read(d.to_string().as_bytes()).unwrap_err().ends_with("only files are supported"));
     d["buffers"][0] = json!({ "byteLength": 7 });
-    assert_eq!(read(d.to_string().as_bytes()).unwrap_err(), "buffer 0 of the glTF file names no file");
+    assert_eq!(read(d.to_string().as_bytes()).unwrap_err(), "buffer 0 of the glTF file has no URI");
 }
 
 #[test]
@@ -185,11 +185,12 @@ fn what_cannot_be_read_is_said() {
     };
     assert_eq!(
         fails(&|d| d["accessors"][0]["sparse"] = json!({ "count": 1 })),
-        "accessor 0 of the glTF file is sparse, which cannot be read; export it without"
+        "accessor 0 of the glTF file is sparse, which is not supported; export without sparse \
+         accessors"
     );
     assert_eq!(
         fails(&|d| d["accessors"][0]["count"] = 5.into()),
-        "accessor 0 of the glTF file reaches beyond its buffer"
+        "accessor 0 of the glTF file extends beyond its buffer"
     );
     assert_eq!(
         fails(&|d| d["accessors"][0]["count"] = 4_000_000_000u64.into()),
@@ -197,22 +198,31 @@ fn what_cannot_be_read_is_said() {
     );
     assert_eq!(
         fails(&|d| d["buffers"][0]["byteLength"] = 999.into()),
-        "buffer 0 of the glTF file has 52 bytes, not 999 as it says"
+        "buffer 0 of the glTF file has 52 bytes, but declares 999"
     );
     assert_eq!(
         fails(&|d| d["extensionsRequired"] = json!(["KHR_draco_mesh_compression"])),
-        "the glTF file is compressed (KHR_draco_mesh_compression), which cannot be read; export it without"
+        "the glTF file is compressed (KHR_draco_mesh_compression), which is not supported; export \
+         without compression"
     );
-    assert_eq!(fails(&|d| d["asset"]["version"] = "1.0".into()), "glTF of version 2 can be read, not 1.0");
+    assert_eq!(
+        fails(&|d| d["asset"]["version"] = "1.0".into()),
+        "only glTF version 2 is \
+        supported, not 1.0"
+    );
     assert_eq!(
         fails(&|d| d["nodes"] =
             json!([{ "mesh": 0 }, { "name": "a", "children": [2] }, { "name": "b", "children": [1] }])),
         "the glTF file's nodes have a cycle: b -> a -> b"
     );
-    assert_eq!(fails(&|d| d["nodes"][0]["mesh"] = 4.into()), "node `node_0` has the mesh 4, which is not there");
-    assert!(fails(&|d| d["nodes"][0]["scale"] = json!([1e200, 1e200, 1e200])).contains("not at a finite place"));
-    assert!(read(b"glTF").unwrap_err().contains("cut short"));
-    assert!(read(b"{").unwrap_err().starts_with("the glTF file cannot be read: EOF"));
+    assert_eq!(
+        fails(&|d| d["nodes"][0]["mesh"] = 4.into()),
+        "node `node_0` refers to the missing \
+        mesh 4"
+    );
+    assert!(fails(&|d| d["nodes"][0]["scale"] = json!([1e200, 1e200, 1e200])).contains("is not finite"));
+    assert!(read(b"glTF").unwrap_err().contains("truncated"));
+    assert!(read(b"{").unwrap_err().starts_with("cannot read the glTF file: EOF"));
 }
 
 /// A square on two joints, with a hat on the second, and what its weights are.
@@ -343,8 +353,12 @@ fn programs_read_them_with_options() {
         (r#"mesh("box.glb", unit = 1, unit = 2)"#, "`unit` is given twice"),
         (r#"mesh("box.glb", scale = 2)"#, "mesh has no option `scale`"),
         (r#"csv("box.glb", up = "z")"#, "csv has no option `up`"),
-        (r#"mesh("box.glb", "z")"#, "mesh takes one path; options are given by name"),
-        (r#"armature("box.glb")"#, "the glTF file has no skin, so nothing says which joint moves what"),
+        (r#"mesh("box.glb", "z")"#, "mesh takes one path; give options by name"),
+        (
+            r#"armature("box.glb")"#,
+            "the glTF file has no skin, so it does not define which joint \
+                                    moves which vertices",
+        ),
         (r#"armature("a.rig.json", up = "z")"#, "`up` and `unit` are for glTF files"),
     ] {
         let said = fails(data);

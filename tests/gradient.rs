@@ -383,7 +383,7 @@ fn what_has_no_derivative_says_so() {
     let selection = trace.select(&Selector::All);
     let targets = trace.targets(selection).to_vec();
     let e = trace.gradient(&targets, 1.0, &mut Vec::new()).unwrap_err();
-    assert!(e.message.contains("`gp` by its argument `cov`"), "{}", e.message);
+    assert!(e.message.contains("`gp`, as a function of its argument `cov`,"), "{}", e.message);
 }
 
 fn find(trace: &Trace, name: &str) -> Option<Target> {

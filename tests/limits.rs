@@ -31,9 +31,9 @@ fn values_that_are_nested_too_deep() {
         says(&grown(step, "[\"x\"]", "100000"), "nested more than 200 deep");
     }
     let observed = |d: &str| format!("let d = {d}; observe d = 3;");
-    says(&observed("fold(fn(d, i) { iid(d, 1) }, normal(0, 1), 0 .. 20000)"), "more than 200 distributions");
+    says(&observed("fold(fn(d, i) { iid(d, 1) }, normal(0, 1), 0 .. 20000)"), "more than 200 nested distributions");
     let mixture = "fold(fn(d, i) { mixture([1, 1], [d, normal(0, 1)]) }, normal(0, 1), 0 .. 20000)";
-    says(&observed(mixture), "more than 200 distributions within each other");
+    says(&observed(mixture), "more than 200 nested distributions");
     let sum = "let c = fold(fn(c, i) { c + white(1) }, white(1), 0 .. 20000); observe gp(0, c, [0, 1]) = [1, 2];";
     says(sum, "more than 200 parameters");
     let product = "let c = fold(fn(c, i) { c * white(1) }, white(1), 0 .. 20000); observe gp(0, c, [0, 1]) = [1, 2];";

@@ -111,7 +111,7 @@ fn zeros_and_ones_are_truth_values() {
     }
     f.write("bits.pcad", program("observe flip(p) = [1, 0, 2, 1];"));
     let d = f.run(&["run", "bits.pcad", "--out", "no"]);
-    assert!(d.code == 1 && d.err.contains("2 is observed"), "{}", d.err);
+    assert!(d.code == 1 && d.err.contains("the observed value 2 is outside the support"), "{}", d.err);
 }
 
 /// What no choice can give is named, with its place and the support.
@@ -119,15 +119,31 @@ fn zeros_and_ones_are_truth_values() {
 fn data_outside_of_a_support_are_named() {
     let f = Folder::new("outside");
     for (observe, says) in [
-        ("observe flip(0.3) = [1, 0, 2];", "2 is observed, and the support of `flip` is true and false"),
-        ("observe poisson(exp(x)) = 2.5;", "2.5 is observed, and the support of `poisson` is integers from 0 up"),
-        ("observe gamma(exp(x), 1) = [1, -1];", "-1 is observed, and the support of `gamma` is numbers above 0"),
-        ("observe beta(exp(x), 1) = 1.5;", "1.5 is observed, and the support of `beta` is numbers from 0 to 1"),
+        (
+            "observe flip(0.3) = [1, 0, 2];",
+            "the observed value 2 is outside the support of `flip` \
+            (true and false)",
+        ),
+        (
+            "observe poisson(exp(x)) = 2.5;",
+            "the observed value 2.5 is outside the support of \
+            `poisson` (integers of at least 0)",
+        ),
+        (
+            "observe gamma(exp(x), 1) = [1, -1];",
+            "the observed value -1 is outside the support of \
+            `gamma` (numbers above 0)",
+        ),
+        (
+            "observe beta(exp(x), 1) = 1.5;",
+            "the observed value 1.5 is outside the support of \
+            `beta` (numbers from 0 to 1)",
+        ),
     ] {
         f.write("x.pcad", format!("assume x ~ normal(0, 1);\n{observe}\n"));
         let d = f.run(&["run", "x.pcad", "--out", "out"]);
         assert!(d.code == 1 && d.err.contains(says) && d.err.contains("x.pcad:2:"), "{observe}: {}", d.err);
-        assert!(d.err.contains("check the data") && !d.err.contains("widen the prior"), "{}", d.err);
+        assert!(d.err.contains("check the data") && !d.err.contains("use a wider prior"), "{}", d.err);
     }
 }
 
@@ -155,9 +171,9 @@ fn what_does_not_move_has_no_r_hat_and_a_reason() {
     let (summary, run) = (json(&f, "out/summary.json"), json(&f, "out/run.json"));
     let quantity = |name: &str| &summary["quantities"][name];
     assert!(quantity("x")["r_hat"].is_null() && quantity("c")["r_hat"].is_null());
-    assert!(quantity("x")["r_hat_reason"].as_str().unwrap().contains("at different values"));
+    assert!(quantity("x")["r_hat_reason"].as_str().unwrap().contains("different values"));
     assert_eq!(quantity("c")["r_hat_reason"], "it never moved");
-    assert!(run["r_hat_max"].is_null() && run["r_hat_max_reason"].as_str().unwrap().contains("at different values"));
+    assert!(run["r_hat_max"].is_null() && run["r_hat_max_reason"].as_str().unwrap().contains("different values"));
 }
 
 #[test]
@@ -213,9 +229,9 @@ fn runs_are_opened_again() {
         .filter_map(|l| l.strip_prefix("v ")?.split(' ').nth(1)?.parse().ok())
         .fold(0.0, f64::max);
     assert!((highest - 0.5).abs() < 0.01, "{highest}");
-    f.refuses(&["show", "out", "--draw", "99"], "there is no kept state 99");
-    f.refuses(&["show", "out", "-o", "x.bmp"], "has to end in .png, .obj or .glb");
-    f.refuses(&["show", "."], "holds no run");
+    f.refuses(&["show", "out", "--draw", "99"], "no kept state 99");
+    f.refuses(&["show", "out", "-o", "x.bmp"], "must end in .png, .obj or .glb");
+    f.refuses(&["show", "."], "is not the folder of a run");
     let mut prompt = assert_cmd::Command::cargo_bin("pcadlang").unwrap();
     let done = prompt.current_dir(f.path()).args(["repl", "out"]).write_stdin("size\nx\n").output().unwrap();
     let said = String::from_utf8_lossy(&done.stdout).into_owned();
@@ -244,7 +260,7 @@ fn runs_are_compared() {
     let sheet = image::open(f.path().join("both.png")).unwrap();
     assert!(sheet.width() > 2 * 512, "{}", sheet.width());
     assert!(f.succeeds(&["compare", "a", "a"]).out.contains("are the same"));
-    f.refuses(&["compare", "a", "."], "holds no run");
+    f.refuses(&["compare", "a", "."], "is not the folder of a run");
 }
 
 /// What a run finds outside of its picture, and what it replaces, are said.
@@ -261,7 +277,7 @@ fn what_is_outside_and_what_is_replaced_is_said() {
     };
     let (within, beyond) = (run(0.0), run(2.4));
     assert!(!within.out.contains("outside of the picture") && !within.err.contains("is replaced"), "{}", within.err);
-    assert!(beyond.out.contains("most of the best scene is outside of the picture"), "{}", beyond.out);
-    assert!(beyond.err.contains("note: the run that was in out is replaced"), "{}", beyond.err);
+    assert!(beyond.out.contains("most of the best scene is outside the picture"), "{}", beyond.out);
+    assert!(beyond.err.contains("note: replacing the earlier run in out"), "{}", beyond.err);
     f.succeeds(&["run", "ball.pcad", "--chains", "2", "--out", "fresh"]);
 }

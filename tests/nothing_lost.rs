@@ -158,7 +158,7 @@ fn interrupted_by_a_signal() {
         let text = said(&output);
         if !output.status.success() {
             assert_eq!(output.status.code(), Some(3), "{text}");
-            assert!(text.contains("to go on, the same command with --resume --out out"), "{text}");
+            assert!(text.contains("to resume, repeat the command with --resume --out out"), "{text}");
             assert_eq!(readable(folder.path()), 2);
         }
         done(&run(folder.path(), &["--steps", "30000", "--resume"]).output().unwrap());
@@ -188,7 +188,7 @@ fn what_belongs_to_another_run_is_refused() {
         assert!(said(&output).contains(reason), "{}", said(&output));
         assert_eq!(draws(folder.path(), 1), before, "what was there is kept");
     };
-    refused(&["--resume", "--warmup", "7"], "of another warmup (none there, 7 now)");
+    refused(&["--resume", "--warmup", "7"], "it has a different warmup (was none, now 7)");
     let file = folder.path().join("out/chain-2.checkpoint");
     let mut bytes = std::fs::read(&file).unwrap();
     let last = bytes.len() - 1;
@@ -196,7 +196,7 @@ fn what_belongs_to_another_run_is_refused() {
     std::fs::write(&file, bytes).unwrap();
     refused(&["--resume", "--steps", "600"], "chain-2.checkpoint: the checkpoint is damaged");
     std::fs::write(folder.path().join("model.pcad"), PROGRAM.replace("flip(0.5)", "flip(0.4)")).unwrap();
-    refused(&["--resume", "--steps", "600"], "of another program");
+    refused(&["--resume", "--steps", "600"], "it has a different program");
 }
 
 #[test]
@@ -225,7 +225,7 @@ fn a_full_disk() {
     let script = format!("trap '' XFSZ; ulimit -f 64; exec {}", words.join(" "));
     let output = Command::new("sh").args(["-c", &script]).current_dir(folder.path()).output().unwrap();
     assert_eq!(output.status.code(), Some(1), "{}", said(&output));
-    assert!(said(&output).contains("draws cannot be written"), "{}", said(&output));
+    assert!(said(&output).contains("cannot write draws"), "{}", said(&output));
     readable(folder.path());
     done(&run(folder.path(), &["--steps", "20000", "--resume"]).output().unwrap());
     compare(whole.path(), folder.path());
@@ -258,7 +258,7 @@ fn a_vanished_input() {
     assert!(folder.path().join("out/overlay.png").exists(), "what was there is kept");
     std::fs::copy(folder.path().join("out/overlay.png"), folder.path().join("cup.png")).unwrap();
     let output = command(&["--resume"]);
-    assert!(said(&output).contains("of another picture, camera or keypoints"), "{}", said(&output));
+    assert!(said(&output).contains("it has a different picture, camera or keypoints"), "{}", said(&output));
 }
 
 /// The largest resident memory of a run of so many draws, in KiB.

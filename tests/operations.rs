@@ -61,7 +61,7 @@ fn what_was_discarded_leads_back() {
             Ok(there) => there,
             Err(e) => {
                 // A choice or observation of the branch not taken.
-                assert!(e.to_string().contains("there is no choice or observation"), "{e}");
+                assert!(e.to_string().contains("the trace has no choice or observation"), "{e}");
                 assert_eq!(bits(&t), before);
                 continue;
             }
@@ -185,11 +185,11 @@ fn wrong_addresses_and_values_are_told() {
     );
     let before = bits(&t);
     for (address, value, said) in [
-        ("@slpe", Value::Num(1.0), "no choice or observation `@slpe` in the trace; did you mean `@slope`?"),
+        ("@slpe", Value::Num(1.0), "the trace has no choice or observation `@slpe`; did you mean `@slope`?"),
         ("@sen", Value::Num(1.0), "did you mean `@seen`?"),
         ("@pose[arn]/bone/r", Value::Num(1.0), "did you mean `@pose[arm]/bone/r`?"),
         ("@z[2]", Value::Num(1.0), "did you mean `@z["),
-        ("@quite/another", Value::Num(1.0), "no choice or observation `@quite/another` in the trace"),
+        ("@quite/another", Value::Num(1.0), "no choice or observation `@quite/another`"),
         ("@a b", Value::Num(1.0), "is not an address"),
         ("@slope", Value::Bool(true), "true does not fit `@slope`, which is drawn from `normal`"),
         ("@on", Value::Num(1.0), "1 does not fit `@on`, which is drawn from `flip`"),

@@ -113,8 +113,8 @@ fn maps_that_are_no_involutions_are_caught() {
             "applied twice, it takes @x from",
         ),
         ("propose @x = 1;", "applied twice, it takes @x from"),
-        ("propose u ~ normal(0, 1); propose @x = twice - value(@x);", "reads choices and constants alone"),
-        ("propose @x ~ normal(0, 1); propose @x = 1;", "given a new value twice"),
+        ("propose u ~ normal(0, 1); propose @x = twice - value(@x);", "use only choices and constants"),
+        ("propose @x ~ normal(0, 1); propose @x = 1;", "gets a new value twice"),
         ("propose @x = -value(@x); propose @x ~ normal(0, 1);", "proposed twice"),
     ];
     for (body, expected) in wrong {
@@ -208,9 +208,9 @@ fn starts_are_proposed_by_a_kernel() {
     assert!(d["x"].iter().all(|x| (x - 42.0).abs() < 0.3), "{:?}", d["x"]);
     assert_ne!(d["x"][0], d["x"][1], "chains start apart");
     for (from, said) in [
-        ("turned()", "a start proposes choices by distributions, not by a map"),
-        ("moves()", "a start is proposed by a kernel of the program"),
-        ("drift(@x)", "a start is proposed by a kernel of the program"),
+        ("turned()", "the kernel of a start must propose choices from distributions, not by a map"),
+        ("moves()", "`from` takes a kernel declared in the program"),
+        ("drift(@x)", "`from` takes a kernel declared in the program"),
     ] {
         let model = pcadlang::Model::from_text(&text(from)).unwrap_or_else(|e| panic!("{e}"));
         let e = model.run(&Default::default(), 1, 1).err().map(|e| e.to_string()).unwrap_or_default();

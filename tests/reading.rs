@@ -8,7 +8,7 @@ use pcadlang::Program;
 use pcadlang::lang::value::Value;
 
 const CHECK: [&str; 2] = ["check", "own/p.pcad"];
-const OUTSIDE: &str = "it is outside of the folders that the program may read";
+const OUTSIDE: &str = "it is outside the folders that the program may read";
 
 /// A folder `own` for a program, beside another of which it should know nothing.
 fn two_folders(name: &str) -> Folder {
@@ -51,7 +51,7 @@ fn files_outside_of_the_folder_are_refused() {
     refused(&f, "data t = csv(\"../missing/x.csv\");", "--allow-read");
     // Below the folder a file is missing like any other.
     f.write("own/p.pcad", "data t = csv(\"parts/missing.csv\");");
-    f.refuses(&CHECK, "there is no such file");
+    f.refuses(&CHECK, "no such file");
 }
 
 #[test]
@@ -75,7 +75,11 @@ fn the_command_line_widens() {
     let both = "include \"../other/part.pcad\" as part; data t = csv(\"../other/x.csv\");";
     allowed(&f, both, &["--allow-read", "other"]);
     f.refuses(&[&CHECK[..], &["--allow-read", "other/deep"]].concat(), "cannot read own/../other/part.pcad");
-    f.refuses(&[&CHECK[..], &["--allow-read", "missing"]].concat(), "cannot read missing: there is no such file");
+    f.refuses(
+        &[&CHECK[..], &["--allow-read", "missing"]].concat(),
+        "cannot read missing: no such \
+        file",
+    );
     f.refuses(&[&CHECK[..], &["--allow-read", "other/x.csv"]].concat(), "cannot read other/x.csv");
     f.write("own/p.pcad", "data t: csv; assume x ~ normal(0, 1); observe normal(x, 1) = t.a[0];");
     let run = ["run", "own/p.pcad", "--steps", "5", "--chains", "1", "--quiet", "--out", "out"];
@@ -99,7 +103,7 @@ fn symbolic_links_are_followed_before_they_are_judged() {
     refused(&f, "data t = csv(\"away/deep/../x.csv\");", "other");
     allowed(&f, "data t = csv(\"within/z.csv\");", &[]);
     f.write("own/p.pcad", "data t = csv(\"broken/x.csv\");");
-    f.refuses(&CHECK, "there is no such file");
+    f.refuses(&CHECK, "no such file");
     // A file that was read becomes a link.
     allowed(&f, "data t = csv(\"y.csv\");", &[]);
     std::fs::remove_file(at("own/y.csv")).unwrap();
@@ -112,7 +116,7 @@ fn symbolic_links_are_followed_before_they_are_judged() {
     // A pipe would wait for somebody to write.
     std::process::Command::new("mkfifo").arg(at("own/pipe.csv")).status().unwrap();
     f.write("own/p.pcad", "data t = csv(\"pipe.csv\");");
-    f.refuses(&CHECK, "it is no plain file");
+    f.refuses(&CHECK, "it is not a regular file");
 }
 
 #[test]
@@ -155,13 +159,13 @@ fn banks_are_looked_for_where_the_program_may_read() {
         )
     };
     let run = ["run", "own/p.pcad", "--chains", "1", "--quiet", "--out", "out"];
-    f.write("other/x.bank", "no bank").write("own/y.bank", "no bank");
+    f.write("other/x.bank", "not a bank").write("own/y.bank", "not a bank");
     f.write("own/p.pcad", program("../other/x.bank"));
     let d = f.run(&run);
     assert!(d.code == 1 && d.err.contains(OUTSIDE) && d.err.contains("--allow-read"), "{}", d.err);
     f.write("own/p.pcad", program("y.bank"));
     let d = f.run(&run);
-    assert!(d.code == 1 && d.err.contains("it is no bank"), "{}", d.err);
+    assert!(d.code == 1 && d.err.contains("it is not a bank"), "{}", d.err);
 }
 
 #[test]

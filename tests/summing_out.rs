@@ -224,7 +224,7 @@ fn what_cannot_be_summed_out_is_an_error() {
     for (program, says) in [
         (
             "assume z ~ flip(0.4); let m = if z { a ~ normal(0, 1); a } else { b ~ normal(3, 1); b };",
-            "appear or vanish",
+            "other choices are created or removed with it",
         ),
         ("assume n ~ poisson(2); let m = n; assume z ~ flip(0.5);", "finitely many values"),
         (
@@ -233,7 +233,7 @@ fn what_cannot_be_summed_out_is_an_error() {
         ),
         (
             "assume z ~ flip(0.4); assume k ~ uniform_discrete(0, if z { 2 } else { 1 }); let m = k;",
-            "what values there are",
+            "its possible values depend on other choices",
         ),
         ("assume z ~ flip(0.4); assume b ~ flat(); let m = if z { b } else { 0 };", "improper"),
     ] {

@@ -187,7 +187,7 @@ fn saved_choices_occur_in_the_program() {
         assert!(load(&saved).is_ok(), "{text}");
         saved["choices"][0]["hash"] = "0000000000000001".into();
         let e = load(&saved).expect_err(text);
-        assert_eq!(e, "the trace has a choice @a which the program does not make");
+        assert_eq!(e, "the trace has a choice @a that the program does not make");
     }
 }
 
@@ -388,7 +388,7 @@ fn surrogates_are_not_part_of_the_joint() {
     assert!((got - expected).abs() < 1e-12, "{got} {expected}");
 }
 
-/// Runaway recursion and values that need themselves are errors, not crashes.
+/// Runaway recursion and values that depend on themselves are errors, not crashes.
 #[test]
 fn runaway_programs_are_stopped() {
     let fails = |text: &str| {
@@ -397,7 +397,9 @@ fn runaway_programs_are_stopped() {
         e.unwrap_or_else(|| panic!("{text} runs")).to_string()
     };
     assert!(fails("fn f(x) { 1 + f(x) } observe normal(f(0), 1) = 0;").contains("nested more than"));
-    assert!(fails("for t in 0 .. 3 { s[t] ~ normal(s[t], 1); observe normal(s[t], 1) = 0; }").contains("needs"));
+    assert!(
+        fails("for t in 0 .. 3 { s[t] ~ normal(s[t], 1); observe normal(s[t], 1) = 0; }").contains("depends on itself")
+    );
     assert!(fails("for i in 0 .. 3 { t[1] ~ normal(0, 1); } observe normal(t[1], 1) = 0;").contains("twice"));
 }
 
@@ -461,7 +463,7 @@ fn a_number_that_turns_into_an_array_is_an_error() {
     let mut number = (0..20).map(|i| model.simulate(1, i).unwrap()).find(|t| is(t, false)).unwrap();
     let before = number.log_joint();
     let error = number.set("@k", true, Streams::default()).unwrap_err().to_string();
-    assert!(error.contains("its parameters turned into arrays"), "{error}");
+    assert!(error.contains("its parameters became arrays"), "{error}");
     assert!(is(&number, false) && number.log_joint() == before);
     // The other way round all is told.
     let mut array = (0..20).map(|i| model.simulate(1, i).unwrap()).find(|t| is(t, true)).unwrap();

@@ -67,7 +67,7 @@ fn more_draws_are_nearer_to_the_reference() {
     let (set, chains, said) = run(&["--quality", "accurate"]);
     assert_eq!((set, chains), (json!({ "n": "20000" }), json!(2)));
     assert!(
-        said.contains("note: --quality accurate: --set n=20000 --chains 2, of mean.quality.json (error 0."),
+        said.contains("note: --quality accurate: --set n=20000 --chains 2, from mean.quality.json (error 0."),
         "{said}"
     );
     assert_eq!(run(&["--quality", "accurate", "--set", "n=10"]).0, json!({ "n": "10" }));
@@ -104,7 +104,7 @@ fn what_was_run_is_not_run_again() {
     // Other cases, another program, another answer: what is there is of something else.
     let refused = |more: &[&str], what: &str| {
         let done = tradeoff(&f, more);
-        assert!(done.code == 1 && done.err.contains(&format!("{what} is not what it was")), "{}", done.err);
+        assert!(done.code == 1 && done.err.contains(&format!("{what} has changed")), "{}", done.err);
         assert_eq!(f.read("tradeoff/runs.jsonl"), after);
     };
     refused(&[], "cases");
@@ -127,7 +127,7 @@ fn a_short_budget_leaves_out_settings_and_says_so() {
     mean_cases(&f);
     cases(&f, &[("c", 0.5), ("d", 1.0), ("e", 1.5), ("f", -2.0)]);
     let none = tradeoff(&f, &["--budget", "1ms", "--jobs", "1"]);
-    assert!(none.code == 1 && none.err.contains("the budget is used up"), "{}", none.err);
+    assert!(none.code == 1 && none.err.contains("the budget ran out"), "{}", none.err);
     // Twenty-four runs that are thought to take eleven seconds each; four minutes are enough for all settings on three cases, half of
     // them on six.
     let half = tradeoff(&f, &["--budget", "4m", "--jobs", "1"]);
@@ -204,7 +204,7 @@ fn mistakes_are_said_before_anything_runs() {
     std::fs::create_dir_all(f.path().join("empty/x")).unwrap();
     f.write("empty/x/image.png", png(disc(48, 32, 24.0, 16.0, 9.0)));
     let none = fails("few.json", "empty");
-    assert!(none.contains("observes no item of kind `image`") || none.contains("no case has a known answer"), "{none}");
+    assert!(none.contains("observes no item of kind `image`") || none.contains("no case has ground truth"), "{none}");
     let unknown = f.run(&["tradeoff", "mean.pcad", "--cases", "cases"]);
-    assert!(unknown.err.contains("mean.settings.json is not there"), "{}", unknown.err);
+    assert!(unknown.err.contains("mean.settings.json does not exist"), "{}", unknown.err);
 }

@@ -10,11 +10,12 @@ pub enum BankError {
     #[error("{0}")]
     Io(#[from] io::Error),
     /// The file is something else.
-    #[error("it is no bank; `pcadlang learn` makes one")]
+    #[error("it is not a bank; `pcadlang learn` makes one")]
     NoBank,
     /// It was written by another version.
     #[error(
-        "it has version {found} of the format, this program reads version {expected}; make it anew with `pcadlang learn`"
+        "it has format version {found}, but this program reads version {expected}; rebuild it \
+         with `pcadlang learn`"
     )]
     Version {
         /// The version of the file.
@@ -27,7 +28,8 @@ pub enum BankError {
     Damaged(String),
     /// It was learnt from another program.
     #[error(
-        "it was learnt from another program, another version of it or other parameters ({name}, hash {found}; this one has {expected}); make it anew with `pcadlang learn`"
+        "it was made from another program, or from another version or other parameters of this \
+         one ({name}, hash {found}; this one has {expected}); rebuild it with `pcadlang learn`"
     )]
     Program {
         /// The program's file, as it was called.

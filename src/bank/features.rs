@@ -50,7 +50,7 @@ impl Features {
                 let (width, height) = (view.camera().width, view.camera().height);
                 let at: Vec<_> = ViewValue(Arc::clone(view)).landmarks(width, height).map(|(_, at)| at).collect();
                 match at.is_empty() {
-                    true => Err(BankError::Observed("the scene has no landmarks; learn with other features".into())),
+                    true => Err(BankError::Observed("the scene has no landmarks; use other features".into())),
                     false => Ok(features::keypoint_features(&at, width, height)),
                 }
             }
@@ -125,10 +125,15 @@ impl Observed {
     /// If what they are of is not observed, or a command fails.
     pub fn query(&self, features: &Features, detector: Option<&str>) -> Result<Query, BankError> {
         let image = self.image.as_ref().and_then(|v| v.downcast::<ImageValue>());
-        let missing = |what: &str| BankError::Observed(format!("it is searched by {what}, and the run observes none"));
+        let missing = |what: &str| {
+            BankError::Observed(format!(
+                "it is searched by {what}, but the \
+            run observes none"
+            ))
+        };
         match features {
             Features::Contours { .. } => {
-                let image = image.ok_or_else(|| missing("a picture's contours"))?;
+                let image = image.ok_or_else(|| missing("the contours of a picture"))?;
                 Ok(Query::contours(&features::observed(image.map().map_err(BankError::Observed)?)))
             }
             Features::Keypoints { names } => {
@@ -138,14 +143,15 @@ impl Observed {
                     (Some(size), _) => size,
                     (None, true) => (1, 1),
                     (None, false) => {
-                        let what = "the keypoints do not say how large their picture is; give \"width\" and \"height\"";
+                        let what = "the keypoints do not give the size of their picture; add \
+                                    \"width\" and \"height\"";
                         return Err(BankError::Observed(what.into()));
                     }
                 };
                 let find = |name: &String| seen.points().iter().find(|p| *p.name == **name);
                 let at: Vec<_> = names.iter().map(|n| find(n).map(|p| seen.position(p, size))).collect();
                 if at.iter().all(Option::is_none) {
-                    return Err(missing("keypoints that the scene has"));
+                    return Err(missing("keypoints present in the scene"));
                 }
                 let sure: Vec<f64> = names.iter().map(|n| find(n).map_or(0.0, |p| p.confidence)).collect();
                 Ok(Query::keypoints(&at, &sure, size.0, size.1))
@@ -153,7 +159,8 @@ impl Observed {
             Features::Command { command, size } => {
                 if detector != Some(command) {
                     let what = format!(
-                        "its features come from a command, which must be given again: --features-from '{command}'"
+                        "its features were computed by a command, which must be given again: \
+                         --features-from '{command}'"
                     );
                     return Err(BankError::Observed(what));
                 }

@@ -52,9 +52,9 @@ impl Banks for BankFiles {
             Ok(n) => Ok(Arc::new(n)),
             Err(BankError::Io(e)) => {
                 let hint = Outside::hint(&e).map_or(String::new(), |h| format!("; {h}"));
-                Err(format!("the bank {bank} cannot be read: {}{hint}", reason(&e)))
+                Err(format!("cannot read the bank {bank}: {}{hint}", reason(&e)))
             }
-            Err(e) => Err(format!("the bank {bank} cannot be used: {e}")),
+            Err(e) => Err(format!("cannot use the bank {bank}: {e}")),
         };
         found.entry((bank.to_owned(), k)).or_insert_with(search).clone()
     }

@@ -77,7 +77,7 @@ impl Preamble {
             return Err(BankError::NoBank);
         }
         if b.len() < START as usize {
-            return Err(BankError::Damaged("it ends too early".into()));
+            return Err(BankError::Damaged("it is truncated".into()));
         }
         let found = word(8) as u32;
         if found != VERSION {
@@ -88,7 +88,7 @@ impl Preamble {
         let table = p.count.checked_add(1).and_then(|n| n.checked_mul(8)).and_then(|n| n.checked_add(p.table));
         let fits = features.is_some_and(|end| end <= p.table) && table == Some(p.header) && p.header < length;
         if !fits || p.count == 0 {
-            return Err(BankError::Damaged("it ends too early, or its parts do not fit".into()));
+            return Err(BankError::Damaged("it is truncated, or its parts are inconsistent".into()));
         }
         Ok(p)
     }

@@ -43,7 +43,7 @@ impl Bank {
         }
         let text = bytes(&mut file, preamble.header, length - preamble.header)?;
         if fnv1a(&text) != preamble.hash {
-            return Err(BankError::Damaged("its header was changed, or ends too early".into()));
+            return Err(BankError::Damaged("its header is altered or truncated".into()));
         }
         let header: Header = serde_json::from_slice(&text).map_err(|e| BankError::Damaged(e.to_string()))?;
         let hash = |(h, name): &(String, String)| Some((u64::from_str_radix(h, 16).ok()?, name.clone()));
@@ -102,13 +102,13 @@ impl Bank {
     /// Where the latents of an entry begin and end.
     fn place(&self, i: usize) -> Result<(u64, u64), BankError> {
         if i >= self.len() {
-            return Err(BankError::Damaged(format!("there is no entry {i} among {}", self.len())));
+            return Err(BankError::Damaged(format!("no entry {i} among {}", self.len())));
         }
         let both = self.read(self.preamble.table + 8 * i as u64, 16)?;
         let word = |k: usize| both.get(k..k + 8).and_then(|b| b.try_into().ok()).map_or(0, u64::from_le_bytes);
         let (from, to) = (word(0), word(8));
         if from > to || to > self.preamble.table || to - from > LONGEST {
-            return Err(BankError::Damaged(format!("the place of entry {i} is wrong")));
+            return Err(BankError::Damaged(format!("the offset of entry {i} is wrong")));
         }
         Ok((from, to))
     }
@@ -130,7 +130,11 @@ impl Bank {
     pub fn nearest(&self, query: &Query, k: usize) -> Result<Vec<(usize, f32)>, BankError> {
         let (width, count) = (self.preamble.width, self.preamble.count);
         if query.len() as u64 != width {
-            let message = format!("the observed picture has {} features, those of the bank have {width}", query.len());
+            let message = format!(
+                "the observed picture has {} features, but those of the bank \
+                                   have {width}",
+                query.len()
+            );
             return Err(BankError::Command(message));
         }
         let rows = (BLOCK / (4 * width).max(1)).max(1);

@@ -12,7 +12,7 @@ use pcadlang::tradeoff::Quality;
 use std::path::PathBuf;
 use std::time::Duration;
 
-/// From a photograph back to a 3D scene, by Bayesian inference.
+/// A probabilistic CAD language: Bayesian inference of 3D scenes from photographs.
 #[derive(Debug, Parser)]
 #[command(name = "pcadlang", version, max_term_width = 100, after_help = super::EXIT_CODES)]
 pub struct Cli {
@@ -24,35 +24,35 @@ pub struct Cli {
 /// The commands.
 #[derive(Debug, Subcommand)]
 pub enum Command {
-    /// Sample the scenes that explain what is observed
+    /// Sample from the posterior of a program, given its observations
     Run(Run),
-    /// Run a program on every picture of a dataset and write what scorers read
+    /// Run a program on every picture of a dataset and write results for scoring
     Evaluate(Evaluate),
-    /// Measure what speed costs in accuracy, over settings and cases with known answers
+    /// Measure the trade-off of speed and accuracy over settings, on cases with ground truth
     Tradeoff(Tradeoff),
-    /// Draw scenes from the prior and show them on one sheet
+    /// Draw scenes from the prior and show them on a contact sheet
     Sample(Sample),
-    /// Draw scenes from the prior into a bank, from which the kernel `knn` proposes
+    /// Fill a bank with scenes drawn from the prior, for the proposals of the kernel `knn`
     Learn(Learn),
-    /// Check programs: without running them, or whether their plans draw from the posterior
+    /// Check programs for mistakes, or test whether their plans sample from the posterior
     Check(Check),
-    /// Draw what would be observed again, and compare with what is
+    /// Predictive check: draw replicated data and compare them with the observed data
     Predict(Predict),
-    /// Find the contours of a photograph
+    /// Detect the contours in a photograph
     Contours(Contours),
-    /// Find the people in a photograph
+    /// Detect the people in a photograph
     Detect(Detect),
-    /// Explain a built-in, search for some, or list all of them
+    /// Explain a built-in, search the built-ins, or list them all
     Doc(Doc),
-    /// Explore a program at a prompt: `:help` there lists what can be done
+    /// Explore a program interactively; `:help` at the prompt lists the commands
     Repl(Repl),
-    /// Format programs: spaces and line ends; comments stay
+    /// Format programs: spacing and line breaks; comments are kept
     Fmt(Fmt),
-    /// Print a script that completes commands in a shell
+    /// Print a shell completion script
     Completions(Completions),
-    /// Show a state of a run that has ended: a picture, a mesh, or its choices
+    /// Show a kept state of a finished run: a picture, a mesh, or its choices
     Show(Show),
-    /// Compare two runs: what was set differently, their quantities, their pictures
+    /// Compare two runs: their settings, quantities and pictures
     Compare(Compare),
     /// Print the manual page, or write one for every command
     Man(Man),
@@ -64,14 +64,14 @@ pub struct Given {
     /// The program: a file, or the name of a shipped one such as lathe.pcad
     #[arg(value_name = "PROG", value_hint = ValueHint::FilePath, value_parser = program_name)]
     pub program: String,
-    /// Set a `param`, its value as in a program; may be repeated
+    /// Set a `param`; the value is written as in a program; may be repeated
     #[arg(long = "set", value_name = "NAME=VALUE", value_parser = pair)]
     pub sets: Vec<(String, String)>,
-    /// The camera, as a JSON file; without one the default view (4.4 units across at distance 8)
+    /// The camera, a JSON file; by default a view 4.4 units across at distance 8
     #[arg(long, value_name = "FILE")]
     pub camera: Option<PathBuf>,
-    /// What finds contours in photographs, in place of gradients of colour: a structured forest (model.yml.gz) or, if this
-    /// build has them, a network (.onnx). Options are written behind it as in `detector` of a program:
+    /// A contour detector to replace colour gradients: a structured forest (model.yml.gz) or, if
+    /// this build supports it, a network (.onnx). Options follow, as in a program's `detector`:
     /// 'net.onnx, colours = "bgr", white = 255'
     #[arg(long, value_name = "FILE[,OPTION=VALUE…]")]
     pub edges: Option<String>,
@@ -86,10 +86,10 @@ pub struct Given {
 /// What a program may read and build.
 #[derive(Args, Clone, Debug, Default)]
 pub struct Allowed {
-    /// A folder below which the program may read files, besides its own folder; may be repeated
+    /// A folder the program may read files from, besides its own; may be repeated
     #[arg(long, value_name = "DIR")]
     pub allow_read: Vec<PathBuf>,
-    /// Another limit on what the program builds: depth, nodes, elements or operations; may be repeated
+    /// Change a limit on evaluation: depth, nodes, elements or operations; may be repeated
     #[arg(long = "limit", value_name = "NAME=N", value_parser = limit)]
     pub limits: Vec<(String, u64)>,
 }
@@ -115,29 +115,29 @@ impl QualityArg {
 /// How a program is sampled.
 #[derive(Args, Clone, Debug, Default)]
 pub struct Sampling {
-    /// The seed: same seed, same draws
+    /// The random seed: the same seed gives the same draws
     #[arg(long, default_value_t = 1)]
     pub seed: u64,
-    /// The number of chains; 4 if left out
+    /// The number of chains [default: 4]
     #[arg(long, value_parser = clap::value_parser!(u32).range(1..=1024))]
     pub chains: Option<u32>,
-    /// The number of threads; as many as the machine has, if left out
+    /// The number of threads [default: all hardware threads]
     #[arg(long, value_parser = clap::value_parser!(u32).range(1..=1024))]
     pub threads: Option<u32>,
-    /// Kernel applications per chain after warm-up, in place of what the program says
+    /// Kernel applications per chain after warm-up, overriding the program's
     #[arg(long)]
     pub steps: Option<u64>,
-    /// Kernel applications per chain in warm-up, in place of what the program says
+    /// Kernel applications per chain in warm-up, overriding the program's
     #[arg(long)]
     pub warmup: Option<u64>,
-    /// Measured presets of speed against accuracy, where the program has them; `own` runs the program as it is
+    /// A measured preset of speed and accuracy; `own` uses the program's own settings
     #[arg(long, value_parser = QualityArg::parser())]
     pub quality: Option<QualityArg>,
-    /// Time in all (of a dataset: each case), such as 10s, 2m or 500ms; at most half of it is warm-up. The measured preset for
-    /// that time is used, unless there is --quality
+    /// The total time (of a dataset: per case), such as 10s, 2m or 500ms; at most half is warm-up.
+    /// Selects the measured preset for that time, unless --quality is given
     #[arg(long, value_parser = duration)]
     pub time: Option<Duration>,
-    /// Re-run the whole program at each step: slow, and the same draws; for checking the engine
+    /// Re-run the whole program at each step: the same draws, but slow; for testing the engine
     #[arg(long)]
     pub no_incremental: bool,
 }
@@ -158,18 +158,18 @@ pub struct Job {
     /// Program, parameters, camera
     #[command(flatten)]
     pub given: Given,
-    /// A file for a `data` item, or FILE#ID for one entry of a JSON file; the name may be left out if there is only
-    /// one that fits
+    /// A file for a `data` item, or FILE#ID for one entry of a JSON file; the name may be omitted
+    /// if only one item fits
     #[arg(long, value_name = "[NAME=]FILE")]
     pub observe: Vec<String>,
-    /// A ready contour map (bright is contour) in place of the photograph's own contours
+    /// A contour map (bright pixels are contour) to use instead of the photograph's own contours
     #[arg(long, value_name = "FILE")]
     pub observe_contours: Option<PathBuf>,
-    /// What a pose detector found: a file for the only `data` item of keypoints. `#ID` chooses one of several people;
-    /// without it the one called like the photograph's file
+    /// Keypoints from a pose detector: a file for the program's one keypoints `data` item. `#ID`
+    /// selects one of several people [default: the entry named after the photograph's file]
     #[arg(long, value_name = "FILE[#ID]")]
     pub keypoints: Option<String>,
-    /// The command that finds the features of the photograph, for a bank that was learnt with it
+    /// The command that computes the photograph's features, for a bank that was made with it
     #[arg(long, value_name = "CMD")]
     pub features_from: Option<String>,
     /// Seed, chains, steps, time
@@ -190,23 +190,23 @@ pub struct Run {
     /// What is run
     #[command(flatten)]
     pub job: Job,
-    /// The folder for results; runs/PROG if left out
+    /// The folder for results [default: runs/PROG]
     #[arg(long, value_name = "DIR")]
     pub out: Option<PathBuf>,
-    /// Go on with the run that the same command began in this folder; begin it if there is none. `--steps` and `--time` may be
-    /// more than before
+    /// Resume the run that the same command began in this folder, if there is one; `--steps` and
+    /// `--time` may be larger than before
     #[arg(long)]
     pub resume: bool,
-    /// The time between checkpoints, which are what a run goes on from
+    /// The time between checkpoints, from which an interrupted run resumes
     #[arg(long, value_parser = duration, default_value = "10s", value_name = "TIME")]
     pub checkpoint: Duration,
-    /// How many whole states are kept for `show`, of all chains together, at even distances
+    /// How many complete states to keep for `show`, evenly spaced, over all chains
     #[arg(long, default_value_t = 100, value_name = "N", value_parser = clap::value_parser!(u32).range(..=100_000))]
     pub keep: u32,
-    /// Also say what was modelled, proposed, redrawn and skipped, and why
+    /// Also report what was modelled, proposed, redrawn and skipped, and why
     #[arg(long)]
     pub explain: bool,
-    /// List everything that is approximate in the run
+    /// List every approximation made in the run
     #[arg(long, short)]
     pub verbose: bool,
     /// Print the summary as JSON
@@ -221,16 +221,16 @@ pub struct Run {
 #[derive(Args, Debug)]
 #[command(after_help = LAYOUTS)]
 pub struct Evaluate {
-    /// Program, parameters, the camera of cases that have none of their own
+    /// Program, parameters, the camera for cases without one
     #[command(flatten)]
     pub given: Given,
     /// The folder of the dataset
     #[arg(value_name = "DATASET")]
     pub dataset: PathBuf,
-    /// The folder for results: a run's folder for each case, and summaries
+    /// The folder for results: one run folder per case, and summaries
     #[arg(long, value_name = "DIR")]
     pub out: PathBuf,
-    /// Detected keypoints, JSON by case: each case observes its own; one without any runs on its picture alone
+    /// Detected keypoints, JSON keyed by case; cases without any run on their picture alone
     #[arg(long, value_name = "FILE")]
     pub keypoints: Option<PathBuf>,
     /// Only these cases
@@ -239,7 +239,7 @@ pub struct Evaluate {
     /// Seed, chains, steps, time
     #[command(flatten)]
     pub sampling: Sampling,
-    /// Do all cases anew; without it, those that are complete are kept, and other settings are an error
+    /// Redo all cases; otherwise completed ones are kept, and changed settings are an error
     #[arg(long)]
     pub fresh: bool,
     /// Print the summary as JSON
@@ -252,13 +252,13 @@ pub struct Evaluate {
 
 /// What a dataset may look like.
 const LAYOUTS: &str = "\
-The dataset is one of
-  * a folder for each case, with image.png (or .jpg) and, if its camera is known, camera.json
-  * a file annotations.json = {\"people\": [{\"id\": …, \"image\": FILE}, …]} with the pictures beside it
-Nothing else in it is read: neither other files nor other fields.
+The dataset is either
+  * one folder per case, with image.png (or .jpg) and, if the camera is known, camera.json
+  * or annotations.json = {\"people\": [{\"id\": …, \"image\": FILE}, …]} with the pictures beside it
+Other files and fields are ignored.
 
-DIR gets, besides a folder for each case, evaluation.json, table.md and, for people, predictions.json. Run again to go on
-after an interruption. Exit code 1 if a case failed, 3 if interrupted.";
+Besides one folder per case, DIR gets evaluation.json, table.md and, for people, predictions.json.
+Repeat the command to resume after an interruption. Exit code 1 if a case failed, 3 if interrupted.";
 
 /// `tradeoff`.
 #[derive(Args, Debug)]
@@ -267,38 +267,39 @@ pub struct Tradeoff {
     /// Program, parameters, camera
     #[command(flatten)]
     pub given: Given,
-    /// The cases: a folder for each, with what is observed and the known answer
+    /// The cases: one folder each, with the observed data and the ground truth
     #[arg(long, value_name = "DIR")]
     pub cases: PathBuf,
-    /// The settings to try, as JSON, also several times; PROG with the ending .settings.json if left out
+    /// The settings to try, a JSON file; may be repeated [default: PROG.settings.json]
     #[arg(long, value_name = "FILE")]
     pub settings: Vec<PathBuf>,
-    /// Detected keypoints of the cases: {CASE: {"keypoints": {NAME: [x, y, …], …}}, …}
+    /// Detected keypoints for the cases: {CASE: {"keypoints": {NAME: [x, y, …], …}}, …}
     #[arg(long, value_name = "FILE")]
     pub keypoints: Option<PathBuf>,
-    /// The folder for results; one that has some of the same kind is taken up
+    /// The folder for results; results already there are reused
     #[arg(long, value_name = "DIR", default_value = "tradeoff")]
     pub out: PathBuf,
-    /// Time for everything, earlier sittings in the folder included; if it is short, settings that fall behind on a few cases are left out
-    /// on the others
+    /// The total time, earlier calls with the same folder included; if it is short, settings that
+    /// do badly on a few cases are dropped
     #[arg(long, value_parser = duration, default_value = "1h")]
     pub budget: Duration,
     /// Runs of each setting on each case
     #[arg(long, default_value_t = 1, value_parser = clap::value_parser!(u32).range(1..=1000))]
     pub seeds: u32,
-    /// Some of the cases, separated by commas
+    /// Only these cases, separated by commas
     #[arg(long, value_name = "CASES", value_delimiter = ',')]
     pub only: Vec<String>,
-    /// The number of threads of each run; 2 if left out
+    /// The number of threads per run [default: 2]
     #[arg(long, value_parser = clap::value_parser!(u32).range(1..=1024))]
     pub threads: Option<u32>,
-    /// How many runs at once; as many as there are threads for, if left out
+    /// The number of concurrent runs [default: as many as the hardware threads allow]
     #[arg(long, value_parser = clap::value_parser!(u32).range(1..=1024))]
     pub jobs: Option<u32>,
-    /// Write the front here too: as PROG with the ending .quality.json, --quality and --time of `run` find it
+    /// Also write the Pareto front to this file; as PROG.quality.json it has the presets for `run
+    /// --quality` and `--time`
     #[arg(long, value_name = "FILE")]
     pub presets: Option<PathBuf>,
-    /// Measure everything anew
+    /// Discard earlier results and measure everything again
     #[arg(long)]
     pub fresh: bool,
     /// Print nothing but errors
@@ -308,12 +309,14 @@ pub struct Tradeoff {
 
 /// What a known answer is.
 const ANSWERS: &str = "\
-A case is a folder with image.png (or .jpg), camera.json if its camera is known, and the answer: depth.npy (and normals.npy), or
-gt.npz with arrays of these names; or one of the people of annotations.json, its `keypoints` the answer. Without pictures: a folder
-with reference.json, {QUANTITY: {\"mean\": …, \"sd\": …}, …}, and a file called like each `data` item, such as y.csv.
+A case is a folder with image.png (or .jpg), camera.json if the camera is known, and the ground truth:
+depth.npy (and normals.npy), or gt.npz with arrays of these names; or a person in annotations.json, with
+the `keypoints` as ground truth. Without pictures: a folder with reference.json,
+{QUANTITY: {\"mean\": …, \"sd\": …}, …}, and a file named after each `data` item, such as y.csv.
 
 Settings: {\"base\": {\"chains\": 4, \"size\": 128}, \"cross\": {\"time\": [1, 3]}, \"vary\": {\"size\": [64], \"chains\": [1, 2]}}
-Each value of `cross` with each change of `vary`, one at a time; `also` is a list of more, `random` a number of random ones; with `compare: true` none becomes a preset. Names other
+Every combination of the `cross` values is run with each change in `vary`, one at a time; `also` lists further
+settings, `random` is a number of random ones; with `compare: true` none of them becomes a preset. Names other
 than program, chains, time, steps and warmup are parameters of the program.";
 
 /// `sample`.
@@ -322,10 +325,10 @@ pub struct Sample {
     /// Program, parameters, camera
     #[command(flatten)]
     pub given: Given,
-    /// How many
+    /// The number of scenes
     #[arg(short, default_value_t = 16, value_parser = clap::value_parser!(u32).range(1..=1024))]
     pub n: u32,
-    /// The seed
+    /// The random seed
     #[arg(long, default_value_t = 1)]
     pub seed: u64,
     /// The picture to write
@@ -342,26 +345,26 @@ pub struct Learn {
     /// Program, parameters, camera
     #[command(flatten)]
     pub given: Given,
-    /// How many scenes
+    /// The number of scenes
     #[arg(short, default_value_t = 10_000, value_parser = clap::value_parser!(u32).range(1..))]
     pub n: u32,
     /// The bank to write
     #[arg(short, long, value_name = "BANK")]
     pub out: PathBuf,
-    /// The seed: same seed, same bank
+    /// The random seed: the same seed gives the same bank
     #[arg(long, default_value_t = 1)]
     pub seed: u64,
-    /// The number of threads; as many as the machine has, if left out
+    /// The number of threads [default: all hardware threads]
     #[arg(long, value_parser = clap::value_parser!(u32).range(1..=1024))]
     pub threads: Option<u32>,
-    /// What tells pictures apart
+    /// The features that pictures are compared by
     #[arg(long, value_enum, default_value_t = FeatureKind::Contours)]
     pub features: FeatureKind,
-    /// A command that prints features of a picture, in place of the built-in ones: numbers, as many for every picture. {png}
-    /// stands for the picture's file; no shell reads it
+    /// A command that prints a picture's features, equally many for all. {png} is replaced by the
+    /// picture's file; no shell is used
     #[arg(long, value_name = "CMD", conflicts_with = "features")]
     pub features_from: Option<String>,
-    /// The longer side of the pictures that features are found in, in pixels
+    /// The longer side of the pictures that features are computed from, in pixels
     #[arg(long, default_value_t = 128, value_parser = clap::value_parser!(u32).range(16..=2048))]
     pub features_size: u32,
     /// Print nothing but errors
@@ -372,7 +375,7 @@ pub struct Learn {
 /// The built-in features.
 #[derive(Clone, Copy, Debug, PartialEq, Eq, clap::ValueEnum)]
 pub enum FeatureKind {
-    /// Distances to contours and histograms of their directions
+    /// Distances to contours and histograms of contour orientations
     Contours,
     /// The positions of landmarks
     Keypoints,
@@ -385,31 +388,31 @@ pub struct Check {
     /// The programs
     #[arg(required = true, value_name = "PROG", value_hint = ValueHint::FilePath, value_parser = program_name)]
     pub programs: Vec<String>,
-    /// Check again whenever a file of a program changes, until interrupted
+    /// Check again whenever a source file changes, until interrupted
     #[arg(long, conflicts_with_all = ["sbc", "geweke"])]
     pub watch: bool,
-    /// Run the plan on data simulated from the program and rank the true values among the draws
+    /// Simulation-based calibration: rank the true values of simulated data among the draws
     #[arg(long)]
     pub sbc: bool,
-    /// Let the plan and fresh data take turns and compare with the prior
+    /// Geweke's test: alternate updates and simulated data, and compare with the prior
     #[arg(long)]
     pub geweke: bool,
-    /// Data sets of --sbc (200 if left out), chains of --geweke (100)
+    /// The number of data sets for --sbc [default: 200], of chains for --geweke [default: 100]
     #[arg(long, value_parser = clap::value_parser!(u32).range(20..=1_000_000))]
     pub replicates: Option<u32>,
-    /// The seed: same seed, same result
+    /// The random seed: the same seed gives the same result
     #[arg(long, default_value_t = 1)]
     pub seed: u64,
-    /// The number of threads; as many as the machine has, if left out
+    /// The number of threads [default: all hardware threads]
     #[arg(long, value_parser = clap::value_parser!(u32).range(1..=1024))]
     pub threads: Option<u32>,
-    /// Kernel applications per chain after warm-up, in place of what the program says
+    /// Kernel applications per chain after warm-up, overriding the program's
     #[arg(long)]
     pub steps: Option<u64>,
-    /// Set a `param`, its value as in a program; may be repeated
+    /// Set a `param`; the value is written as in a program; may be repeated
     #[arg(long = "set", value_name = "NAME=VALUE", value_parser = pair)]
     pub sets: Vec<(String, String)>,
-    /// A file for a `data` item: simulated data take its form
+    /// A file for a `data` item; simulated data have the same shape
     #[arg(long, value_name = "[NAME=]FILE")]
     pub observe: Vec<String>,
     /// What the programs may read and build
@@ -419,9 +422,9 @@ pub struct Check {
 
 /// What the two checks are.
 const CHECKS: &str = "\
-With --sbc or --geweke data are simulated from the program itself, so every observation needs a sampler: distributions have
-one, and scene.mask, scene.depth, scene.keypoints and scene.region (one power of 1, the other 0). Exit code 1 if a quantity
-fails, or if the program cannot be simulated. A right plan fails by chance once in 1000.";
+With --sbc or --geweke, data are simulated from the program, so every observation needs a sampler: all
+distributions have one, and scene.mask, scene.depth, scene.keypoints and scene.region (powers 1 and 0). Exit
+code 1 if a quantity fails or the program cannot be simulated. A correct plan fails once in 1000 by chance.";
 
 /// `predict`.
 #[derive(Args, Debug)]
@@ -429,13 +432,13 @@ pub struct Predict {
     /// What is run
     #[command(flatten)]
     pub job: Job,
-    /// Draw from the prior in place of the posterior
+    /// Draw from the prior instead of the posterior
     #[arg(long)]
     pub prior: bool,
-    /// Draws from the prior
+    /// The number of draws from the prior
     #[arg(short, default_value_t = 1000, requires = "prior", value_parser = clap::value_parser!(u32).range(1..=1_000_000))]
     pub n: u32,
-    /// The folder for results; runs/PROG-predictive if left out
+    /// The folder for results [default: runs/PROG-predictive]
     #[arg(long, value_name = "DIR")]
     pub out: Option<PathBuf>,
 }
@@ -449,11 +452,12 @@ pub struct Contours {
     /// The contour map to write
     #[arg(short, long, value_name = "FILE", default_value = "contours.png")]
     pub out: PathBuf,
-    /// The longer side at which contours are looked for, in pixels; 256 if left out, 512 with --edges, at most 2048 then
+    /// The longer side in pixels at which contours are detected [default: 256; with --edges 512]
     #[arg(long, value_parser = clap::value_parser!(u32).range(8..=8192))]
     pub size: Option<u32>,
-    /// What finds them, in place of gradients of colour: a structured forest (model.yml.gz) or, if this build has them, a
-    /// network (.onnx). Options are written behind it as in `detector` of a program: 'net.onnx, colours = "bgr", white = 255'
+    /// A contour detector to replace colour gradients: a structured forest (model.yml.gz) or, if
+    /// this build supports it, a network (.onnx). Options follow, as in a program's `detector`:
+    /// 'net.onnx, colours = "bgr", white = 255'
     #[arg(long, value_name = "FILE[,OPTION=VALUE…]")]
     pub edges: Option<String>,
 }
@@ -461,9 +465,9 @@ pub struct Contours {
 /// `doc`.
 #[derive(Args, Debug)]
 pub struct Doc {
-    /// The name of a built-in; all of them, as Markdown, if left out
+    /// The name of a built-in; without it, all of them, as Markdown
     pub name: Option<String>,
-    /// Find built-ins by words in their names, sections and descriptions
+    /// Search names, sections and descriptions for these words
     #[arg(long, value_name = "WORDS", num_args = 1.., conflicts_with = "name")]
     pub search: Option<Vec<String>>,
 }
@@ -471,10 +475,10 @@ pub struct Doc {
 /// `fmt`.
 #[derive(Args, Debug)]
 pub struct Fmt {
-    /// Programs, and folders with programs in them
+    /// Programs, or folders containing programs
     #[arg(value_name = "FILE", value_hint = ValueHint::AnyPath, required_unless_present = "stdin")]
     pub paths: Vec<PathBuf>,
-    /// Change nothing; name the files that would change, and exit with 1 if there are any
+    /// Only list the files that would change, and exit with code 1 if there are any
     #[arg(long)]
     pub check: bool,
     /// Read a program from standard input and write it to standard output
@@ -486,47 +490,48 @@ pub struct Fmt {
 #[derive(Args, Debug)]
 #[command(after_help = PROMPT)]
 pub struct Repl {
-    /// The program to begin with: a file, the name of a shipped one, or the folder of a run, whose program, data, settings and best
-    /// state are taken up; an empty one if left out
+    /// The program to start from: a file, the name of a shipped program, or the folder of a run
+    /// (its program, data, settings and best state are loaded). Without it, an empty program
     #[arg(value_name = "PROG|RUN", value_parser = program_name)]
     pub program: Option<String>,
-    /// Set a `param`, its value as in a program; may be repeated
+    /// Set a `param`; the value is written as in a program; may be repeated
     #[arg(long = "set", value_name = "NAME=VALUE", value_parser = pair, requires = "program")]
     pub sets: Vec<(String, String)>,
-    /// The camera, as a JSON file
+    /// The camera, a JSON file
     #[arg(long, value_name = "FILE", requires = "program")]
     pub camera: Option<PathBuf>,
-    /// A file for a `data` item; the name may be left out if there is only one that fits
+    /// A file for a `data` item; the name may be omitted if only one item fits
     #[arg(long, value_name = "[NAME=]FILE", requires = "program")]
     pub observe: Vec<String>,
-    /// What a pose detector found: a file for the only `data` item of keypoints
+    /// Keypoints from a pose detector: a file for the program's one keypoints `data` item
     #[arg(long, value_name = "FILE[#ID]", requires = "program")]
     pub keypoints: Option<String>,
     /// What the program may read and build
     #[command(flatten)]
     pub allowed: Allowed,
-    /// The seed: the same lines with the same seed give the same session
+    /// The random seed: the same input with the same seed gives the same session
     #[arg(long, default_value_t = 1)]
     pub seed: u64,
-    /// How pictures are shown; told from the environment if left out
+    /// How to show pictures [default: detected from the environment]
     #[arg(long, value_enum)]
     pub graphics: Option<Graphics>,
-    /// Show what is read with its prompt, and go on after errors: a recording of a session
+    /// Echo each line with its prompt and continue after errors: a transcript of a session
     #[arg(long)]
     pub transcript: bool,
 }
 
 /// What `repl` does with its input.
 const PROMPT: &str = "\
-On a terminal there are editing, history and completion (Tab). What is piped in runs as a script: exit code 1 at the first
-error. Ctrl-C clears the line, or ends what is under way and leaves everything as it was; Ctrl-D leaves.";
+A terminal has line editing, history and completion (Tab). Piped input runs as a script, which stops with
+exit code 1 at the first error. Ctrl-C clears the line, or cancels the running command and undoes its
+changes; Ctrl-D quits.";
 
 /// Ways to show a picture.
 #[derive(Clone, Copy, Debug, PartialEq, Eq, clap::ValueEnum)]
 pub enum Graphics {
-    /// The protocol of kitty and ghostty
+    /// The graphics protocol of kitty and ghostty
     Kitty,
-    /// That of iTerm2 and WezTerm
+    /// The graphics protocol of iTerm2 and WezTerm
     Iterm,
     /// Sixels: xterm, foot, mlterm, mintty
     Sixel,
@@ -534,7 +539,7 @@ pub enum Graphics {
     Blocks,
     /// Half blocks in 256 colours
     Blocks256,
-    /// A file
+    /// Write pictures to files
     File,
 }
 

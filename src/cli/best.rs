@@ -116,14 +116,17 @@ fn draw(
     }
     let caption = match located.is_empty() {
         true => "the best state over it",
-        false => "the best state over it; its own joints yellow, each with a line to where it was detected",
+        false => {
+            "the best state over it; the model's joints in yellow, each joined to its \
+                  detected position"
+        }
     };
     shown.pictures.push((caption, overlay));
     let (spread, agreement) = frequency(chains, seed, 128);
     let spread = encode(png(&spread))?;
     shown.agreement = agreement;
     write(dir, "uncertainty.png", &spread)?;
-    shown.pictures.push(("how often the last draws of the chains cover a pixel", spread));
+    shown.pictures.push(("the fraction of the chains' last draws that cover each pixel", spread));
     if let Some(mesh) = mesh(view.solid()) {
         write(dir, "best.obj", obj::write(&mesh).as_bytes())?;
         write(dir, "best.glb", &glb::write(&mesh))?;
@@ -150,7 +153,8 @@ fn inside(mesh: &Mesh, camera: &Camera) -> Option<f64> {
 pub fn outside(shown: &Shown) -> Option<String> {
     let inside = shown.inside.filter(|inside| *inside < 0.5)?;
     Some(format!(
-        "most of the best scene is outside of the picture ({:.0} % of its mesh is inside): of the rest only the prior tells",
+        "most of the best scene is outside the picture ({:.0}% of its mesh is inside); the rest \
+         is determined by the prior alone",
         100.0 * inside
     ))
 }
@@ -160,7 +164,7 @@ fn mesh(solid: &Solid) -> Option<Mesh> {
     match solid.to_mesh() {
         Ok(mesh) => Some(mesh),
         Err(e) => {
-            error_line!("warning: no mesh is written: {e}");
+            error_line!("warning: cannot write the mesh: {e}");
             None
         }
     }
@@ -192,7 +196,8 @@ const AGREE: f64 = 0.9;
 pub fn disagreement(shown: &Shown) -> Option<String> {
     let agreement = shown.agreement.filter(|a| *a < AGREE)?;
     Some(format!(
-        "the last states of the chains cover the same pixels to {:.0} % only: it is doubtful that what was looked for is found (see uncertainty.png)",
+        "the chains' last states agree on only {:.0}% of the pixels they cover: the object may \
+         not have been found (see uncertainty.png)",
         100.0 * agreement
     ))
 }
@@ -212,7 +217,7 @@ fn export(
     match exported(value, &name) {
         Ok(bytes) => write(dir, &name, &bytes),
         Err(e) => {
-            error_line!("warning: no mesh is written: {e}");
+            error_line!("warning: cannot write the mesh: {e}");
             Ok(())
         }
     }

@@ -105,7 +105,8 @@ fn run<T>(
 fn failure(e: infer::calibration::CalibrationError, model: &Model) -> Failure {
     match e {
         CalibrationError::NotSimulable(reason) => {
-            let hint = "programs are checked on data of their own: proper priors, and observations that have samplers";
+            let hint = "programs are checked on simulated data: they need proper priors, and \
+                        observations that have samplers";
             Failure::Plain(reason, Some(hint.into()))
         }
         CalibrationError::TooFew(reason) => plain(reason),
@@ -115,7 +116,7 @@ fn failure(e: infer::calibration::CalibrationError, model: &Model) -> Failure {
 
 /// The table of `--sbc`.
 fn ranks(path: &str, said: &Sbc, seed: u64, took: f64) -> String {
-    let mut rows = vec![["quantity", "ranks", "chi2", "p", "least ess", "verdict"].map(str::to_owned).to_vec()];
+    let mut rows = vec![["quantity", "ranks", "chi2", "p", "min ess", "verdict"].map(str::to_owned).to_vec()];
     for r in &said.rows {
         let verdict = match (r.passes, r.is_short) {
             (true, false) => "ok",
@@ -129,7 +130,8 @@ fn ranks(path: &str, said: &Sbc, seed: u64, took: f64) -> String {
     let mut s = format!("{path}: simulation-based calibration\n{}", table::aligned(&rows));
     s.push_str(&more(said.left_out));
     s.push_str(&format!(
-        "{} data sets; ranks among {} draws in {} bins; fails below p = {} ({FALSE_ALARMS} over {} quantities)\n",
+        "{} data sets; ranks among {} draws in {} bins; fails below p = {} (false alarm rate \
+         {FALSE_ALARMS} over {} quantities)\n",
         said.replicates,
         RANKS - 1,
         said.bins,
@@ -137,15 +139,18 @@ fn ranks(path: &str, said: &Sbc, seed: u64, took: f64) -> String {
         said.rows.len(),
     ));
     if said.rows.iter().any(|r| r.is_short) {
-        s.push_str("few draws: chains have fewer independent draws than are ranked; give more with --steps\n");
+        s.push_str(
+            "few draws: some chains have a smaller effective sample size than the number \
+                    of ranked draws; increase --steps\n",
+        );
     }
-    s.push_str(&format!("seed {seed}, {} steps a chain, {}\n", said.steps, seconds(took)));
+    s.push_str(&format!("seed {seed}, {} steps per chain, {}\n", said.steps, seconds(took)));
     s
 }
 
 /// The table of `--geweke`.
 fn turns(path: &str, said: &Geweke, seed: u64, took: f64) -> String {
-    let head = ["quantity", "median, prior", "median, turns", "z mean", "z square", "verdict"];
+    let head = ["quantity", "median, prior", "median, chains", "z mean", "z square", "verdict"];
     let mut rows = vec![head.map(str::to_owned).to_vec()];
     for r in &said.rows {
         let z = |z: f64| format!("{z:.2}");
@@ -156,7 +161,8 @@ fn turns(path: &str, said: &Geweke, seed: u64, took: f64) -> String {
     let mut s = format!("{path}: Geweke's joint distribution test\n{}", table::aligned(&rows));
     s.push_str(&more(said.left_out));
     s.push_str(&format!(
-        "{} chains of {} turns against {} draws from the prior; fails beyond |z| = {:.2} ({FALSE_ALARMS} over {} scores)\n",
+        "{} chains of {} alternations against {} draws from the prior; fails beyond |z| = {:.2} \
+         (false alarm rate {FALSE_ALARMS} over {} scores)\n",
         said.chains,
         said.turns,
         said.marginal,
@@ -168,7 +174,14 @@ fn turns(path: &str, said: &Geweke, seed: u64, took: f64) -> String {
 }
 
 fn more(left_out: usize) -> String {
-    if left_out == 0 { String::new() } else { format!("… and {left_out} more, which fewer states have\n") }
+    if left_out == 0 {
+        String::new()
+    } else {
+        format!(
+            "… and {left_out} more, present in fewer \
+        states\n"
+        )
+    }
 }
 
 /// Counts as bars, level with the largest.

@@ -15,10 +15,10 @@ pub struct Compare {
     /// The folder of a run
     #[arg(value_name = "A")]
     pub a: PathBuf,
-    /// That of another
+    /// The folder of another run
     #[arg(value_name = "B")]
     pub b: PathBuf,
-    /// Where to write their overlays side by side (.png)
+    /// A file to write their overlays to, side by side (.png)
     #[arg(short, value_name = "FILE")]
     pub out: Option<PathBuf>,
 }
@@ -79,10 +79,10 @@ pub fn compare(a: &Compare) -> Result<(), Failure> {
         (_, program, data) => {
             print_line!("\nonly A: {}\nonly B: {}", only(&left, &right), only(&right, &left));
             if !program {
-                print_line!("the programs are not the same");
+                print_line!("the programs differ");
             }
             if !data {
-                print_line!("what is observed is not the same");
+                print_line!("the observed data differ");
             }
         }
     }
@@ -104,7 +104,7 @@ fn quantities(one: &Told, two: &Told) -> String {
         .map(|name| (name, apart(name)))
         .collect();
     both.sort_by(|a, b| b.1.total_cmp(&a.1));
-    let head = ["quantity", "mean A", "sd A", "mean B", "sd B", "apart, sd", "r_hat A", "r_hat B"];
+    let head = ["quantity", "mean A", "sd A", "mean B", "sd B", "difference/sd", "r_hat A", "r_hat B"];
     let mut rows = vec![head.map(str::to_owned).to_vec()];
     for (name, apart) in both.iter().take(LISTED) {
         let of = |t: &Told, what: &str| number(t.number(name, what));

@@ -16,11 +16,14 @@ pub fn contours(a: &Contours) -> Result<(), Failure> {
         }
         Some(spec) => {
             let DetectorValue(detector) = edges::detector(spec)?;
-            let detector = detector.ok_or_else(|| plain(format!("{spec} is no detector")))?;
+            let detector = detector.ok_or_else(|| plain(format!("{spec} is not a detector")))?;
             let size = a.size.unwrap_or(FileDetector::SIZE);
             if size > FileDetector::MOST {
                 let most = FileDetector::MOST;
-                return Err(plain(format!("--size {size}: with --edges the longer side is at most {most} pixels")));
+                return Err(plain(format!(
+                    "--size {size}: with --edges the longer side may be at \
+                    most {most} pixels"
+                )));
             }
             let map = detector.map(&photo, size).map_err(|e| plain(format!("{spec}: {e}")))?;
             detector.contours(&map, &photo, detector.sigma())

@@ -15,25 +15,25 @@ pub struct Detect {
     /// The photograph
     #[arg(value_name = "IMG")]
     pub image: PathBuf,
-    /// The file to write people to, which `--keypoints` reads
+    /// The file to write the people to, readable by `--keypoints`
     #[arg(short, long, value_name = "FILE", default_value = "people.json")]
     pub out: PathBuf,
     /// Its layout
     #[arg(long, value_enum, default_value_t = PeopleFormat::Coco)]
     pub format: PeopleFormat,
-    /// Draw people over the photograph
+    /// Draw the people over the photograph, to this file
     #[arg(long, value_name = "PNG")]
     pub overlay: Option<PathBuf>,
     /// A folder with networks: pose_detection.tflite, pose_landmark_heavy.tflite, …_full or …_lite
     #[arg(long, value_name = "DIR")]
     pub models: Option<PathBuf>,
-    /// How often the picture is looked at: with more and more padding, each time mirrored too
+    /// The number of views of the picture: with increasing padding, each also mirrored
     #[arg(long, default_value_t = 2, value_parser = clap::value_parser!(u32).range(2..=8))]
     pub views: u32,
-    /// The most people that a view is searched for
+    /// The maximum number of people per view
     #[arg(long, default_value_t = 2, value_parser = clap::value_parser!(u32).range(1..=100))]
     pub people: u32,
-    /// Threads; 0 means all cores
+    /// The number of threads; 0 means all cores
     #[arg(long, default_value_t = 0)]
     pub threads: usize,
 }
@@ -41,9 +41,9 @@ pub struct Detect {
 /// How people are written.
 #[derive(clap::ValueEnum, Clone, Copy, Debug, PartialEq, Eq)]
 pub enum PeopleFormat {
-    /// COCO's annotations, with all landmarks beside them
+    /// COCO annotations, with all landmarks added
     Coco,
-    /// MediaPipe's 33 landmarks, as shares of the picture
+    /// MediaPipe's 33 landmarks, as fractions of the picture's sides
     Mediapipe,
 }
 
@@ -113,11 +113,10 @@ fn finder(folder: Option<&Path>) -> Result<PeopleFinder, Failure> {
             (Cow::Borrowed(detection), Cow::Borrowed(landmarks), "the program's own".to_owned())
         }
         Some(folder) => {
-            let best = LANDMARKS
-                .iter()
-                .map(|n| folder.join(n))
-                .find(|p| p.exists())
-                .ok_or_else(|| plain(format!("{}: none of {} is there", folder.display(), LANDMARKS.join(", "))))?;
+            let best =
+                LANDMARKS.iter().map(|n| folder.join(n)).find(|p| p.exists()).ok_or_else(|| {
+                    plain(format!("{}: none of {} was found", folder.display(), LANDMARKS.join(", ")))
+                })?;
             // Detection is the same for all of them.
             let detection = match (folder.join(DETECTION), shipped()) {
                 (path, Ok((own, _))) if !path.exists() => Cow::Borrowed(own),
@@ -143,7 +142,7 @@ pub fn choose(folder: Option<&Path>) -> Result<(), Failure> {
 
 fn found(people: &[Person]) -> String {
     match people.len() {
-        0 => "nobody was found".into(),
+        0 => "no people were found".into(),
         1 => "1 person".into(),
         n => format!("{n} people, the most prominent first"),
     }
@@ -159,8 +158,8 @@ fn line(number: usize, p: &Person, (width, height): (u32, u32)) -> String {
         n => format!(", {n} other poses"),
     };
     format!(
-        "{number}: {left} to {right} across, {top} to {bottom} down; {seen} of {} landmarks in the picture; {} of {} views \
-         agree{others}; {:.0} % sure",
+        "{number}: x {left} to {right}, y {top} to {bottom}; {seen} of {} landmarks in the \
+         picture; {} of {} views agree{others}; {:.0}% confidence",
         p.landmarks.len(),
         p.agreeing,
         p.views,

@@ -23,7 +23,7 @@ pub fn doc(a: &Doc) -> Result<(), Failure> {
         None => {
             let names: Vec<String> = table.iter().map(|b| b.full_name()).collect();
             let near = pcadlang::diag::nearest(name, names.iter().map(String::as_str));
-            let search = || format!("`pcadlang doc --search {name}` looks in descriptions too");
+            let search = || format!("`pcadlang doc --search {name}` also searches the descriptions");
             let hint = near.map_or_else(search, |n| format!("did you mean `{n}`?"));
             match name.as_str() {
                 "" => Err(plain("a name is needed")),
@@ -40,16 +40,19 @@ const LISTED: usize = 20;
 fn find(table: &Table, words: &str) -> Result<(), Failure> {
     let found = search(table, words);
     for (word, near) in &found.instead {
-        print_line!("Nothing says \"{word}\"; \"{near}\" is looked for.\n");
+        print_line!("No match for \"{word}\"; searching for \"{near}\".\n");
     }
     for word in found.unknown.iter().filter(|_| !found.entries.is_empty()) {
-        print_line!("Nothing says \"{word}\".\n");
+        print_line!("No match for \"{word}\".\n");
     }
     for b in found.entries.iter().take(LISTED) {
         print_line!("{}\n    {}", b.signature(), b.doc);
     }
     match found.entries.len() {
-        0 => Err(Failure::Plain(format!("no built-in has {words:?}"), Some("`pcadlang doc` lists all of them".into()))),
+        0 => Err(Failure::Plain(
+            format!("no built-in matches {words:?}"),
+            Some("`pcadlang doc` lists all of them".into()),
+        )),
         n if n > LISTED => {
             print_line!("… and {} more; another word narrows it down", n - LISTED);
             Ok(())

@@ -66,8 +66,8 @@ pub fn resumed(folder: &Path, record: &Map<String, Value>) -> Result<RunDir, Fai
     match &differences(&there, &now)[..] {
         [] => RunDir::open(folder).map_err(|e| plain(e.to_string())),
         different => Err(Failure::Plain(
-            format!("the run in {} cannot go on: it is of another {}", folder.display(), different.join(", ")),
-            Some("repeat the command it was begun with, or choose another folder with --out".into()),
+            format!("the run in {} cannot be resumed: it has a different {}", folder.display(), different.join(", ")),
+            Some("repeat the command that began it, or choose another folder with --out".into()),
         )),
     }
 }
@@ -79,7 +79,7 @@ fn said(what: &str, there: &Value, now: &Value) -> String {
         Value::Object(m) if m.is_empty() => "none".to_owned(),
         v => v.to_string(),
     };
-    format!("{what} ({} there, {} now)", text(there), text(now))
+    format!("{what} (was {}, now {})", text(there), text(now))
 }
 
 #[cfg(test)]
@@ -103,9 +103,9 @@ mod tests {
         there["settings"]["time"] = json!(3.5);
         there["program_hash"] = json!("c");
         there["set"] = json!({});
-        let expected = ["program", "seed (2 there, 1 now)", r#"--set (none there, {"x":"2","y":"3"} now)"#];
+        let expected = ["program", "seed (was 2, now 1)", r#"--set (was none, now {"x":"2","y":"3"})"#];
         assert_eq!(differences(&there, &record)[..3], expected);
-        assert_eq!(differences(&there, &record)[3..], ["time (3.5 there, none now)"]);
+        assert_eq!(differences(&there, &record)[3..], ["time (was 3.5, now none)"]);
         assert_eq!(differences(&json!([]), &record).len(), 6);
     }
 }

@@ -34,7 +34,12 @@ pub fn detector(spec: &str) -> Result<DetectorValue, Failure> {
     let (file, text) = split(spec);
     let options = options(text)?;
     let bytes = files::read(Path::new(file))?;
-    let alone = |other: &str| Err(format!("{file} names {other}, but a detector is one file"));
+    let alone = |other: &str| {
+        Err(format!(
+            "{file} refers to {other}, but a detector must be a \
+        single file"
+        ))
+    };
     let loaded = data::load("detector", file, &bytes, &options, &alone);
     let loaded = loaded.map_err(|f| Failure::Plain(f.message, f.hint))?;
     let detector = loaded.downcast::<DetectorValue>().cloned().unwrap_or_default();
@@ -61,7 +66,7 @@ fn options(text: &str) -> Result<Options, Failure> {
         }
         _ => None,
     };
-    let args = args.ok_or_else(|| wrong("options of a detector were expected behind the file", None))?;
+    let args = args.ok_or_else(|| wrong("expected the options of a detector after the file name", None))?;
     Options::parse("detector", args).map_err(|(_, f)| wrong(&f.message, f.hint))
 }
 

@@ -150,16 +150,16 @@ impl Explanation {
             };
             vec![format!("  {}", g.name), g.choices.to_string(), alone]
         };
-        let head = ["  choices", "of them", "one at a time, accepted"].map(str::to_owned).to_vec();
+        let head = ["  choices", "of them", "single-site proposals, accepted"].map(str::to_owned).to_vec();
         text += &aligned(&std::iter::once(head).chain(self.groups.iter().map(row)).collect::<Vec<_>>());
         let mut by: BTreeMap<&[String], Vec<&str>> = BTreeMap::new();
         self.groups.iter().for_each(|g| by.entry(&g.kernels).or_default().push(&g.name));
         for (kernels, names) in by {
             let kernels =
-                if kernels.is_empty() { "no kernel: the plan names none of them".into() } else { kernels.join(", ") };
+                if kernels.is_empty() { "no kernel: the plan does not select them".into() } else { kernels.join(", ") };
             text += &wrapped(&format!("{} by {kernels}", names.join(", ")));
         }
-        text += "\nredrawn, by one proposal of\n";
+        text += "\nredrawn, for one proposal of\n";
         for g in &self.groups {
             text += &wrapped(&format!("{}: {}", g.name, redrawn(g.drawn.as_ref())));
         }
@@ -176,20 +176,23 @@ impl Explanation {
     /// What was left out, and why.
     fn skipped(&self) -> Vec<String> {
         let absent = |[place, text]: &[String; 2]| {
-            format!("{place} `{text}`: not drawn, since nothing that is observed asks for it in this state")
+            format!(
+                "{place} `{text}`: not sampled, since no observation depends on it in this \
+                     state"
+            )
         };
         let mut all: Vec<String> = self.absent.iter().map(absent).collect();
         let most =
             |of: fn(&Work) -> u64| self.groups.iter().filter_map(|g| g.drawn.as_ref().map(of)).max().unwrap_or(0);
         let [closed, outside, hidden] = [most(|w| w.closed), most(|w| w.outside), most(|w| w.hidden)];
         if closed > 0 {
-            all.push("backs of closed bodies: their fronts hide them".into());
+            all.push("back faces of closed bodies: hidden by the front faces".into());
         }
         if outside > 0 {
-            all.push(format!("{}: outside of the picture", count(outside, "mesh")));
+            all.push(format!("{}: outside the picture", count(outside, "mesh")));
         }
         if hidden > 0 {
-            all.push(format!("{}: wholly behind what stands still", count(hidden, "mesh")));
+            all.push(format!("{}: entirely hidden by stationary meshes", count(hidden, "mesh")));
         }
         all
     }
@@ -222,7 +225,7 @@ fn redrawn(w: Option<&Work>) -> String {
     let Some(w) = w else { return "impossible in this state".into() };
     let pictures = w.whole + w.partial;
     if pictures == 0 {
-        return format!("no picture in {TRIES} proposals");
+        return format!("nothing redrawn in {TRIES} proposals");
     }
     let mut s = format!("{} drawn ({})", count(w.drawn, "mesh"), count(w.triangles, "triangle"));
     s += &format!(", {} kept", w.kept);

@@ -44,7 +44,7 @@ pub fn fmt(a: &Fmt) -> Result<(), Failure> {
             format!("{n} of {all} programs would change"),
             Some("`pcadlang fmt` without --check formats them".into()),
         )),
-        (n, _) => Err(plain(format!("{n} of {all} programs do not parse and are left as they are"))),
+        (n, _) => Err(plain(format!("{n} of {all} programs do not parse and are unchanged"))),
     }
 }
 

@@ -111,8 +111,13 @@ pub fn file_of(spec: &str) -> &str {
 fn part(kind: &str, called: &str, file: &str, id: &str) -> Result<Value, Failure> {
     let all: serde_json::Value =
         serde_json::from_slice(&files::read(Path::new(file))?).map_err(|e| plain(format!("{file}: {e}")))?;
-    let found = all.get(id).ok_or_else(|| plain(format!("{file}: there is no entry {id:?}")))?;
-    let alone = |other: &str| Err(format!("{called} names {other}, but an entry of a file has no files beside it"));
+    let found = all.get(id).ok_or_else(|| plain(format!("{file}: no entry {id:?}")))?;
+    let alone = |other: &str| {
+        Err(format!(
+            "{called} refers to {other}, but an entry of a JSON \
+        file cannot refer to other files"
+        ))
+    };
     data::load(kind, called, found.to_string().as_bytes(), &data::Options::default(), &alone)
         .map_err(|e| Failure::Plain(e.message, e.hint))
 }
@@ -144,11 +149,11 @@ fn only(program: &Program, kind: &str, option: &str) -> Result<String, Failure> 
     let (one, many) = if kind == "image" { ("image", "images") } else { (kind, kind) };
     match fit[..] {
         [one] => Ok(one.to_owned()),
-        [] if data.is_empty() => Err(plain(format!("the program observes no data; leave out {option}"))),
+        [] if data.is_empty() => Err(plain(format!("the program has no `data` items; omit {option}"))),
         [] => {
             let names: Vec<&str> = data.iter().map(|d| d.name.as_str()).collect();
             let hint = match kind {
-                "keypoints" => "give it an item to observe: data points = keypoints();".to_owned(),
+                "keypoints" => "declare one: data points = keypoints();".to_owned(),
                 _ => format!("name the item: --observe NAME=FILE, one of {}", names.join(", ")),
             };
             Err(Failure::Plain(format!("the program observes no {one}"), Some(hint)))

@@ -231,7 +231,7 @@ pub fn write_record(dir: &RunDir, record: &Map<String, Value>, state: &str, more
 
 /// Writes a file of a run.
 pub fn write(dir: &RunDir, name: &str, bytes: &[u8]) -> Result<(), Failure> {
-    dir.write(name, bytes).map_err(|e| plain(format!("{e}; what was written before is kept")))
+    dir.write(name, bytes).map_err(|e| plain(format!("{e}; earlier output is kept")))
 }
 
 /// Says in `run.json` that a run failed, and why.
@@ -338,7 +338,7 @@ fn fill(
     widen(&mut draws);
     let points = chains.first().map_or_else(Vec::new, |c| c.last.points(MOST_POINTS));
     let zarr = zarr::write(dir.path(), &draws, &points);
-    zarr.map_err(|e| plain(format!("{}: {e}; what was written before is kept", dir.file(zarr::ZARR).display())))?;
+    zarr.map_err(|e| plain(format!("{}: {e}; earlier output is kept", dir.file(zarr::ZARR).display())))?;
     let quantities = quantities(&draws);
     let every = draws.iter().map(|d| d.every).max().unwrap_or(1);
     let kernels = table::merged(chains.iter().map(|c| &c.kernels[..]));
@@ -414,7 +414,7 @@ fn write_traces(dir: &RunDir, kept: &KeptTraces) -> Result<(), Failure> {
 fn approximate(job: &Job, chains: &[ChainResult]) -> Vec<String> {
     let mut all = chains.first().map_or_else(Vec::new, |c| c.last.approximations());
     if job.sampling.time.is_some() {
-        all.push("a limit of time: how far the chains came depends on the machine".into());
+        all.push("the time limit: the number of steps taken depends on the machine".into());
     }
     all
 }

@@ -16,7 +16,7 @@ pub struct Completions {
 /// `man`.
 #[derive(Args, Debug)]
 pub struct Man {
-    /// The folder to write pages to, one for each command: pcadlang.1, pcadlang-run.1, …
+    /// The folder to write the pages to, one per command: pcadlang.1, pcadlang-run.1, …
     #[arg(long, value_name = "DIR", value_hint = ValueHint::DirPath)]
     pub out: Option<PathBuf>,
 }
@@ -47,7 +47,7 @@ fn page(command: &clap::Command) -> Result<Vec<u8>, Failure> {
     let mut text = Vec::new();
     let source = concat!("pcadlang ", env!("CARGO_PKG_VERSION"));
     let rendered = clap_mangen::Man::new(command.clone()).source(source).render(&mut text);
-    rendered.map_err(|e| plain(format!("the page of {} cannot be written: {e}", command.get_name())))?;
+    rendered.map_err(|e| plain(format!("cannot write the page of {}: {e}", command.get_name())))?;
     Ok(text)
 }
 

@@ -77,8 +77,8 @@ fn plain(message: impl Into<String>) -> Failure {
 
 /// What `--help` and the manual pages say of exit codes.
 pub const EXIT_CODES: &str = "\
-Exit codes: 0 done, 1 the program, its data or a file is at fault, 2 the command line is, 3 interrupted (what there is is kept), 130 \
-interrupted twice.";
+Exit codes: 0 success, 1 an error in the program, its data or a file, 2 an error in the command line, \
+3 interrupted (results so far are kept), 130 interrupted twice.";
 
 /// Runs a command, and gives the exit code.
 pub fn main(cli: Cli) -> ExitCode {

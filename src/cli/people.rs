@@ -9,14 +9,15 @@ use std::path::PathBuf;
 /// Which person of a photograph is meant, and what finds people.
 #[derive(Args, Clone, Debug, Default)]
 pub struct Who {
-    /// Which of the people in the photograph, the most prominent being 1: sets the program's `person`
+    /// Which person in the photograph, 1 being the most prominent: sets the program's `person`
     #[arg(long, value_name = "N", value_parser = clap::value_parser!(u32).range(1..))]
     pub person: Option<u32>,
-    /// A box in pixels of the photograph: the person who fills it best. Sets the program's `near`
+    /// A box in pixels of the photograph: selects the person who fills it best. Sets the program's
+    /// `near`
     #[arg(long = "box", value_name = "X,Y,W,H", value_parser = rectangle)]
     pub near: Option<[f64; 4]>,
-    /// A folder with networks that find people in place of the program's own: pose_detection.tflite,
-    /// pose_landmark_heavy.tflite, …_full or …_lite
+    /// A folder with networks to detect people with, instead of the built-in ones:
+    /// pose_detection.tflite, pose_landmark_heavy.tflite, …_full or …_lite
     #[arg(long, value_name = "DIR")]
     pub models: Option<PathBuf>,
 }
@@ -27,7 +28,7 @@ fn rectangle(text: &str) -> Result<[f64; 4], String> {
         text.split(',').filter_map(|x| x.trim().parse().ok()).filter(|x: &f64| x.is_finite()).collect();
     match numbers[..] {
         [x, y, w, h] if text.split(',').count() == 4 && w > 0.0 && h > 0.0 => Ok([x, y, w, h]),
-        _ => Err("four numbers X,Y,W,H with a positive width and height were expected".into()),
+        _ => Err("expected four numbers X,Y,W,H with positive width and height".into()),
     }
 }
 
@@ -56,31 +57,32 @@ pub fn warnings(name: &str, image: &Value, person: u32) -> Vec<String> {
     let Some((image, people)) = image.and_then(|i| Some((i, i.people()?))) else { return Vec::new() };
     if people.is_empty() {
         return vec![format!(
-            "nobody was found in `{name}`: the program has only the rest of the picture to go by, which seldom finds a body \
-             (another detector's joints: --keypoints FILE)"
+            "no person was found in `{name}`: without detected joints the body is seldom found \
+             (--keypoints FILE gives the joints found by another detector)"
         )];
     }
     let Some(chosen) = people.get((person as usize).saturating_sub(1)) else {
-        return vec![format!("only {} people were found in `{name}`: there is no person {person}", people.len())];
+        return vec![format!("only {} people were found in `{name}`, so there is no person {person}", people.len())];
     };
     let mut all = Vec::new();
     if chosen.sure < DOUBTFUL {
         all.push(format!(
-            "it is doubtful that `{name}` shows a person: the networks are {:.0} % sure (look at the overlay, or at `pcadlang detect`)",
+            "`{name}` may not show a person: the networks' confidence is {:.0}% (see the overlay, \
+             or `pcadlang detect`)",
             100.0 * chosen.sure
         ));
     }
     if people.len() > 1 {
         all.push(format!(
-            "several people were found in `{name}`, of whom person {person} is meant; others with --person N or --box X,Y,W,H \
-             (`pcadlang detect` lists them)"
+            "several people were found in `{name}`; person {person} is used. Choose another with \
+             --person N or --box X,Y,W,H (`pcadlang detect` lists them)"
         ));
     }
     let inside = inside(chosen, image.size());
     if 2 * inside < BODY.len() {
         all.push(format!(
-            "most of the body is outside the picture: {inside} of {} shoulders, elbows, wrists, hips, knees and ankles are inside; \
-             of the others only the prior tells",
+            "most of the body is outside the picture: {inside} of {} shoulders, elbows, wrists, \
+             hips, knees and ankles are inside; the others are determined by the prior alone",
             BODY.len()
         ));
     }

@@ -28,7 +28,7 @@ pub fn best_of_each(modes: &[Mode], best: &BestSoFar) -> Vec<(String, Arc<BestSt
     };
     let said = |(i, m): (usize, &Mode)| {
         let best = state(m)?;
-        let probability = m.probability.map_or(String::new(), |p| format!(", {:.0} %", 100.0 * p));
+        let probability = m.probability.map_or(String::new(), |p| format!(", {:.0}%", 100.0 * p));
         let text = format!("{}: {} of {chains}{probability}, {:.0}", i + 1, m.chains.len(), best.log_joint);
         Some((text, best))
     };
@@ -69,7 +69,8 @@ pub fn show_places(
     let bytes = png(&sheet).map_err(|e| plain(e.to_string()))?;
     write(dir, "modes.png", &bytes)?;
     shown.pictures.push((
-        "the modes that the chains are in: how many chains, how probable they are, the log joint density of their best state",
+        "the modes found by the chains: number of chains, estimated probability, log joint \
+         density of the best state",
         bytes,
     ));
     Ok(())

@@ -37,7 +37,7 @@ pub fn predict(a: &Predict) -> Result<(), Failure> {
     if draws.iter().flatten().all(|r| r.groups.is_empty()) {
         let named: Vec<String> = silent.iter().map(|(name, what)| format!("{name} is {what}")).collect();
         let hint = (!named.is_empty()).then(|| named.join("; "));
-        return Err(Failure::Plain("no observation of the program has a sampler".into(), hint));
+        return Err(Failure::Plain("none of the program's observations has a sampler".into(), hint));
     }
     let stem = job::stem(&a.job.given.program);
     let dir = match &a.out {
@@ -48,7 +48,7 @@ pub fn predict(a: &Predict) -> Result<(), Failure> {
     write(&dir, "predictive.csv", csv(&now, &draws).as_bytes())?;
     print_text!("{}", compared(what, &now, &draws));
     for (name, what) in silent {
-        print_line!("note: {name} is {what}: it is left out");
+        print_line!("note: {name} is {what}, so it is left out");
     }
     let count: usize = draws.iter().map(Vec::len).sum();
     let took = seconds(begun.elapsed().as_secs_f64());
@@ -109,9 +109,17 @@ fn compared(what: &str, now: &Replication, draws: &[Vec<Replication>]) -> String
         }
     }
     let mut s = table::aligned(&rows);
-    let _ = writeln!(s, "tail: the share of {what} replications beyond what is observed; 0.5 is in the middle");
+    let _ = writeln!(
+        s,
+        "tail: the fraction of {what} replications beyond the observed value (a \
+                         predictive p-value); 0.5 is the centre"
+    );
     if marked {
-        let _ = writeln!(s, "*: beyond {EXTREME} on one side: the program does not make data like these");
+        let _ = writeln!(
+            s,
+            "*: tail probability below {EXTREME} on one side: the program rarely \
+                             produces such data"
+        );
     }
     s
 }

@@ -150,7 +150,7 @@ fn line(k: &Known, elapsed: Duration, limit: Option<Duration>) -> String {
     }
     s.push_str(&format!(", {} steps", k.steps));
     if elapsed.as_secs_f64() >= 0.5 {
-        s.push_str(&format!(", {} a second", number((k.steps as f64 / elapsed.as_secs_f64()).round())));
+        s.push_str(&format!(", {} per second", number((k.steps as f64 / elapsed.as_secs_f64()).round())));
     }
     s
 }
@@ -178,13 +178,21 @@ mod tests {
         let mut k = Known { chains: (4, "chains"), ..Known::default() };
         assert_eq!(line(&k, s(0), None), "starts, 0 s, 0 steps");
         (k.started, k.warming, k.steps, k.best) = (2, 2, 500, Some(-12.34));
-        assert_eq!(line(&k, s(2), Some(s(300))), "warm-up, 4 min 58 s left, best -12.3, 500 steps, 250 a second");
+        assert_eq!(
+            line(&k, s(2), Some(s(300))),
+            "warm-up, 4 min 58 s left, best -12.3, 500 \
+            steps, 250 per second"
+        );
         (k.started, k.warming, k.ended, k.steps) = (4, 0, 2, 12_345_678);
         let said = line(&k, s(2), Some(s(300)));
         assert!(said.starts_with("sampling, 2 of 4 chains, 4 min 58 s left, best -12.3, 12345678 steps"), "{said}");
         // The bar and the line fit a terminal of 80 columns but for the rate.
         assert!(said.find(" steps").is_some_and(|i| i + 6 + 11 <= 80), "{said}");
         (k.ended, k.best) = (4, Some(f64::NEG_INFINITY));
-        assert_eq!(line(&k, s(3), Some(s(3))), "finishing, 4 of 4 chains, 12345678 steps, 4.12e6 a second");
+        assert_eq!(
+            line(&k, s(3), Some(s(3))),
+            "finishing, 4 of 4 chains, 12345678 steps, 4.12e6 \
+            per second"
+        );
     }
 }

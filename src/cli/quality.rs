@@ -36,19 +36,20 @@ pub fn apply(job: &mut Job, keypoints: bool) -> Result<Option<String>, Failure> 
         return Ok(presets.of_time(seconds).map(|choice| fill(job, &choice, &name)));
     };
     let Some((name, presets)) = known else {
-        let hint = "pcadlang tradeoff measures settings on cases with known answers; --presets writes the file";
-        return Err(Failure::Plain(
-            format!("nothing is known of the speed and accuracy of {program}"),
-            Some(hint.into()),
-        ));
+        let hint = "`pcadlang tradeoff` measures settings on cases with ground truth; its option \
+                    --presets writes the file";
+        return Err(Failure::Plain(format!("{program} has no measured presets"), Some(hint.into())));
     };
     if !fits(&presets, keypoints) {
         let needs = presets.needs.join(", ");
-        return Err(plain(format!("what is known of {program} was measured with {needs}; --quality needs it")));
+        return Err(plain(format!(
+            "the presets of {program} were measured with {needs}; --quality \
+                                  requires {needs}"
+        )));
     }
     match presets.of_quality(quality) {
         Some(choice) => Ok(Some(fill(job, &choice, &name))),
-        None => Err(plain(format!("{name} has no settings"))),
+        None => Err(plain(format!("{name} contains no presets"))),
     }
 }
 
@@ -89,9 +90,10 @@ fn fill(job: &mut Job, choice: &Choice, name: &str) -> String {
     let [low, high] = choice.preset.interval;
     let (error, cases) = (choice.preset.error, choice.preset.cases);
     format!(
-        "{}: {}, of {name} (error {error}, {low} to {high} over {cases} cases); --quality own runs the program as it is",
+        "{}: {}, from {name} (error {error}, {low} to {high} over {cases} cases); --quality own \
+         uses the program's own settings",
         choice.wanted,
-        if said.is_empty() { "nothing to fill in".to_owned() } else { said.join(" ") },
+        if said.is_empty() { "no changes".to_owned() } else { said.join(" ") },
     )
 }
 

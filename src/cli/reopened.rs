@@ -56,8 +56,8 @@ impl Reopened {
     pub fn open(folder: &Path) -> Result<Reopened, Failure> {
         let run = super::earlier::run(folder)?;
         let told = || {
-            let hint = "run it again with this version; pictures of cases are kept by `evaluate` itself";
-            Failure::Plain(format!("{}: its command was not kept", folder.display()), Some(hint.into()))
+            let hint = "run it again with this version; `evaluate` keeps the pictures of its cases";
+            Failure::Plain(format!("{}: the folder does not record its command", folder.display()), Some(hint.into()))
         };
         let kept = run["arguments"].as_array().ok_or_else(told)?;
         let arguments: Vec<String> = kept.iter().filter_map(|a| a.as_str().map(str::to_owned)).collect();
@@ -66,7 +66,7 @@ impl Reopened {
             Ok(Cli { command: Command::Run(run) }) => {
                 Ok(Reopened { folder: folder.to_owned(), job: run.job, arguments })
             }
-            _ => Err(plain(format!("{}: its command is none of this version", folder.display()))),
+            _ => Err(plain(format!("{}: this version does not have the command it was run with", folder.display()))),
         }
     }
 

@@ -14,13 +14,16 @@ pub fn run(a: &Run) -> Result<(), Failure> {
     let ready = job::prepare(job, a.quiet)?;
     let (_, default_plan) = ready.model.plan()?;
     if let (Some(text), false) = (&default_plan, a.quiet) {
-        error_line!("note: the program has no `infer` block; this plan is used, copy and edit it:\n{text}");
+        error_line!(
+            "note: the program has no `infer` block; using this default plan, which you \
+                     can copy and edit:\n{text}"
+        );
     }
     let interrupt = Interrupt::listen();
     let record = job::record(job, ready.model.hash(), &job::inputs_hash(job, &ready.model)?);
     let (runs, name) = (Path::new("runs"), job::stem(&job.given.program));
     if let Some(path) = a.out.as_ref().filter(|path| !a.resume && !a.quiet && earlier::left(path).is_some()) {
-        error_line!("note: the run that was in {} is replaced", path.display());
+        error_line!("note: replacing the earlier run in {}", path.display());
     }
     let dir = match &a.out {
         Some(path) if a.resume => earlier::resumed(path, &record)?,
@@ -77,7 +80,7 @@ fn show(a: &Run, job: &Job, dir: &RunDir, o: &Outcome, explained: Option<&Explan
         [] => {}
         all if a.verbose => all.iter().for_each(|a| print_line!("approximate: {a}")),
         [one] => print_line!("approximate: {one}"),
-        all => print_line!("approximate: {} things, listed in the report and with --verbose", all.len()),
+        all => print_line!("approximate: {} approximations, listed in the report and with --verbose", all.len()),
     }
     if o.chains.first().is_some_and(|c| c.last.is_pseudo()) {
         print_line!(
@@ -85,17 +88,18 @@ fn show(a: &Run, job: &Job, dir: &RunDir, o: &Outcome, explained: Option<&Explan
         );
     }
     if o.every > 1 {
-        print_line!("note: the summary is of one draw in {}; the files of the chains have all", o.every);
+        print_line!("note: the summary is thinned to one draw in {}; the chain files have all draws", o.every);
     }
     let steps: u64 = o.chains.iter().map(|c| c.steps + c.warmup).sum();
     let most = o.chains.iter().map(|c| (c.steps, c.warmup)).max().unwrap_or_default();
     print_line!("seed {seed}, {} chains, {steps} steps in {}", o.chains.len(), seconds(o.seconds));
     if job.sampling.time.is_some() {
-        print_line!("the longest chain again: --steps {} --warmup {}{}", most.0, most.1, quality::again(job));
+        print_line!("to repeat the longest chain: --steps {} --warmup {}{}", most.0, most.1, quality::again(job));
     }
     if o.interrupted {
         print_line!(
-            "interrupted: every draw so far is kept; to go on, the same command with --resume --out {}",
+            "interrupted: all draws so far are kept; to resume, repeat the command with --resume \
+             --out {}",
             shown(dir)
         );
     }

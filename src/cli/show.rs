@@ -16,10 +16,11 @@ pub struct Show {
     /// The folder of the run
     #[arg(value_name = "RUN")]
     pub run: PathBuf,
-    /// Which of the kept states, counted from 1 in the order of the list that `show RUN` prints; the best state if left out
+    /// Which kept state, numbered from 1 as listed by `show RUN` [default: the best state]
     #[arg(long, value_name = "N", value_parser = clap::value_parser!(u32).range(1..))]
     pub draw: Option<u32>,
-    /// Where to write it: the picture over the photograph (.png) or the mesh (.obj, .glb); the choices are printed if left out
+    /// The file to write: the picture over the photograph (.png) or the mesh (.obj, .glb). Without
+    /// it, the choices are printed
     #[arg(short, value_name = "FILE")]
     pub out: Option<PathBuf>,
 }
@@ -36,7 +37,7 @@ pub fn show(a: &Show) -> Result<(), Failure> {
         Some(n) => {
             let found = kept.get(n as usize - 1);
             let there = format!("{} states of {} are kept (--keep of `run`)", kept.len(), a.run.display());
-            found.ok_or_else(|| Failure::Plain(format!("there is no kept state {n}"), Some(there)))?.trace.clone()
+            found.ok_or_else(|| Failure::Plain(format!("no kept state {n}"), Some(there)))?.trace.clone()
         }
     };
     let ready = job::prepare(&run.job, true)?;
@@ -59,8 +60,8 @@ pub fn show(a: &Show) -> Result<(), Failure> {
         return Ok(());
     };
     let draws = scene::predictive(run.job.sampling.seed, 0);
-    let view = scene::view(&mut trace, draws, None).ok_or_else(|| plain("the program has no view to show"))?;
-    let mesh = || view.solid().to_mesh().map_err(|e| plain(format!("no mesh: {e}")));
+    let view = scene::view(&mut trace, draws, None).ok_or_else(|| plain("the program has no view"))?;
+    let mesh = || view.solid().to_mesh().map_err(|e| plain(format!("cannot make a mesh: {e}")));
     let bytes = match out.extension().and_then(|e| e.to_str()) {
         Some("png") => {
             let (camera, photo) = (view.camera(), ready.photo());
@@ -69,7 +70,7 @@ pub fn show(a: &Show) -> Result<(), Failure> {
         }
         Some("obj") => obj::write(&mesh()?).into_bytes(),
         Some("glb") => glb::write(&mesh()?),
-        _ => return Err(plain(format!("{}: its name has to end in .png, .obj or .glb", out.display()))),
+        _ => return Err(plain(format!("{}: the file name must end in .png, .obj or .glb", out.display()))),
     };
     files::write(Path::new(out), &bytes)
 }

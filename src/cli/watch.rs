@@ -24,7 +24,7 @@ pub fn watch(a: &Check) -> Result<(), Failure> {
         if let Err(failure) = check::check(a) {
             term::fail(failure);
         }
-        print_line!("\nWatching {}; Ctrl-C ends.", files(seen.0.len()));
+        print_line!("\nWatching {}; press Ctrl-C to stop.", files(seen.0.len()));
         loop {
             if interrupt.asked() {
                 return Ok(());

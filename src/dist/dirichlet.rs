@@ -19,7 +19,13 @@ impl Dirichlet {
     /// With these concentrations; fails unless there is one, and all are positive and have a finite sum.
     pub fn new(alpha: &[f64]) -> Result<Dirichlet, ParamError> {
         if alpha.is_empty() {
-            return Err(ParamError::new("dirichlet", "alpha", "none", "must have a number for each share"));
+            return Err(ParamError::new(
+                "dirichlet",
+                "alpha",
+                "none",
+                "must have one number per \
+                component",
+            ));
         }
         for a in alpha {
             positive("dirichlet", "alpha", *a)?;

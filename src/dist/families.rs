@@ -49,7 +49,7 @@ pub const FAMILIES: &[Family] = &[
     ),
     family(
         "lognormal",
-        "The exponential of a normal number.",
+        "The distribution of the exponential of a normal variable.",
         &[p("mu", "The mean of the logarithm."), p("sigma", "The standard deviation of the logarithm, positive.")],
         "x > 0",
         "exp(-((ln x - mu) / sigma)^2 / 2) / (x sigma sqrt(2 pi))",
@@ -57,13 +57,13 @@ pub const FAMILIES: &[Family] = &[
     family(
         "uniform",
         "The uniform distribution on an interval.",
-        &[p("lo", "The lower end."), p("hi", "The upper end, above `lo`.")],
+        &[p("lo", "The lower bound."), p("hi", "The upper bound, above `lo`.")],
         "lo <= x <= hi",
         "1 / (hi - lo)",
     ),
     family(
         "beta",
-        "The beta distribution: a share.",
+        "The beta distribution: a proportion between 0 and 1.",
         &[p("a", "The first shape, positive."), p("b", "The second shape, positive.")],
         "0 <= x <= 1; a pole at 0 if a < 1 and at 1 if b < 1",
         "x^(a - 1) (1 - x)^(b - 1) / B(a, b)",
@@ -84,15 +84,22 @@ pub const FAMILIES: &[Family] = &[
     ),
     family(
         "half_normal",
-        "The absolute value of a normal number with mean 0.",
-        &[p("sd", "The standard deviation of that number, positive.")],
+        "The distribution of the absolute value of a normal variable with mean 0.",
+        &[p("sd", "The standard deviation of the normal variable, positive.")],
         "x >= 0",
         "2 exp(-(x / sd)^2 / 2) / (sd sqrt(2 pi))",
     ),
     family(
         "half_cauchy",
         "The upper half of a Cauchy distribution.",
-        &[p("location", "Where it begins."), p("scale", "The median distance from there, positive.")],
+        &[
+            p("location", "The lower end of the support."),
+            p(
+                "scale",
+                "The scale, positive: the \
+            median distance from the location.",
+            ),
+        ],
         "x >= location",
         "2 / (pi scale (1 + ((x - location) / scale)^2))",
     ),
@@ -121,18 +128,19 @@ pub const FAMILIES: &[Family] = &[
     ),
     family(
         "truncated",
-        "Any distribution of numbers between two bounds; of integers, the bounds are inside.",
+        "Any distribution of numbers truncated to an interval; for integers, the bounds are \
+         included.",
         &[
-            p("d", "A distribution of numbers, or an array of such made by an array parameter."),
+            p("d", "A distribution of numbers, or of arrays of numbers if a parameter is an array."),
             p("lo", "The lower bound."),
-            p("hi", "The upper bound, above `lo`; of integers it may be `lo`."),
+            p("hi", "The upper bound, above `lo`; for integers it may equal `lo`."),
         ],
-        "lo <= x <= hi, as far as `d` draws numbers there",
-        "that of d over P(lo <= X <= hi), computed in log space",
+        "lo <= x <= hi, within the support of `d`",
+        "that of d divided by P(lo <= X <= hi), computed in log space",
     ),
     family(
         "inv_gamma",
-        "The inverse of a gamma number: 1 / x is gamma(shape, rate = scale).",
+        "The inverse gamma distribution: 1 / x is gamma(shape, rate = scale).",
         &[p("shape", "The shape, positive."), p("scale", "The scale, positive.")],
         "x > 0",
         "scale^shape x^(-shape - 1) exp(-scale / x) / Gamma(shape)",
@@ -140,25 +148,40 @@ pub const FAMILIES: &[Family] = &[
     family(
         "cauchy",
         "The Cauchy distribution, which has no mean.",
-        &[p("location", "The centre."), p("scale", "The median distance from there, positive.")],
+        &[
+            p("location", "The centre."),
+            p(
+                "scale",
+                "The scale, positive: the median distance from \
+            the location.",
+            ),
+        ],
         "all numbers",
         "1 / (pi scale (1 + ((x - location) / scale)^2))",
     ),
     family(
         "laplace",
-        "The Laplace distribution: exponential on both sides.",
-        &[p("location", "The centre."), p("scale", "The mean distance from there, positive.")],
+        "The Laplace (double exponential) distribution.",
+        &[
+            p("location", "The centre."),
+            p(
+                "scale",
+                "The scale, positive: the mean distance from \
+            the location.",
+            ),
+        ],
         "all numbers",
         "exp(-|x - location| / scale) / (2 scale)",
     ),
     family(
         "von_mises",
-        "The von Mises distribution of an angle, in radians; moves go around the circle.",
+        "The von Mises distribution of an angle, in radians; proposals wrap around the circle.",
         &[
             p("mean", "The mean direction, in radians: any finite number."),
             p(
                 "concentration",
-                "How narrow it is, not negative; 0 is uniform, 1 / concentration about the variance if large.",
+                "The concentration, not negative; 0 is uniform; if large, 1 / concentration is \
+                 about the variance.",
             ),
         ],
         "-pi < x <= pi",
@@ -190,21 +213,24 @@ pub const FAMILIES: &[Family] = &[
     ),
     family(
         "flat",
-        "The improper flat prior, on all numbers or on one side of a bound: flat(lo = 0) for what is positive. It cannot be drawn from, so kernels that redraw choices reject; a chain starts at uniform(-2, 2) in the unconstrained space, or where `force` says.",
+        "The improper flat prior, on all numbers or on one side of a bound: flat(lo = 0) for \
+         positive numbers. It cannot be sampled, so kernels that propose from the prior reject; a \
+         chain starts at uniform(-2, 2) in the unconstrained space, or at the value set by \
+         `force`.",
         &[p("lo", "The lower bound."), p("hi", "The upper bound; at most one of them is finite.")],
         "lo <= x <= hi",
-        "1, which has no integral",
+        "1, which is not integrable",
     ),
     family(
         "flip",
-        "The toss of a coin: true or false.",
+        "The Bernoulli distribution: true or false.",
         &[p("p", "The probability of true, from 0 to 1.")],
         "false, true",
         "p if x else 1 - p",
     ),
     family(
         "categorical",
-        "An index drawn in proportion to weights.",
+        "The categorical distribution: an index drawn in proportion to weights.",
         &[p("weights", "One weight for each of 0, 1, …; they need not sum to 1.")],
         "0, 1, …, len(weights) - 1",
         "weights[x] / sum(weights)",
@@ -212,35 +238,42 @@ pub const FAMILIES: &[Family] = &[
     family(
         "uniform_discrete",
         "The uniform distribution on a range of integers.",
-        &[p("lo", "The least."), p("hi", "The greatest, itself included.")],
+        &[p("lo", "The minimum."), p("hi", "The maximum, included.")],
         "lo, lo + 1, …, hi",
         "1 / (hi - lo + 1)",
     ),
     family(
         "binomial",
-        "The number of successes in independent trials.",
-        &[p("n", "How many trials, an integer."), p("p", "The probability of success, from 0 to 1.")],
+        "The binomial distribution: the number of successes in independent trials.",
+        &[p("n", "The number of trials, an integer."), p("p", "The probability of success, from 0 to 1.")],
         "0, 1, …, n",
         "n! / (x! (n - x)!) p^x (1 - p)^(n - x)",
     ),
     family(
         "poisson",
-        "The number of events at a constant rate.",
+        "The Poisson distribution: the number of events at a constant rate.",
         &[p("rate", "The mean, not negative.")],
         "0, 1, 2, …",
         "rate^x exp(-rate) / x!",
     ),
     family(
         "dirichlet",
-        "Shares that sum to 1.",
-        &[p("alpha", "One positive concentration for each share.")],
-        "arrays of shares x[i] >= 0 with sum 1",
+        "The Dirichlet distribution: proportions that sum to 1.",
+        &[p("alpha", "One positive concentration per component.")],
+        "arrays of proportions x[i] >= 0 with sum 1",
         "Gamma(sum(alpha)) product(x[i]^(alpha[i] - 1) / Gamma(alpha[i]))",
     ),
     family(
         "multinomial",
-        "How many of n draws are of each kind.",
-        &[p("n", "How many draws, an integer."), p("weights", "One weight for each kind; they need not sum to 1.")],
+        "The multinomial distribution: the counts of each category among n draws.",
+        &[
+            p("n", "The number of draws, an integer."),
+            p(
+                "weights",
+                "One weight per category; they \
+            need not sum to 1.",
+            ),
+        ],
         "arrays of len(weights) counts with sum n",
         "n! product((weights[i] / sum(weights))^x[i] / x[i]!)",
     ),
@@ -248,17 +281,22 @@ pub const FAMILIES: &[Family] = &[
         "lkj",
         "The LKJ distribution: the Cholesky factor of a correlation matrix, as rows, which `mv_normal` takes as `chol`.",
         &[
-            p("n", "How many rows, from 1 to 1000."),
-            p("eta", "The shape, positive: 1 is uniform over correlation matrices, more is closer to independence."),
+            p("n", "The number of rows, from 1 to 1000."),
+            p(
+                "eta",
+                "The shape, positive: 1 is uniform over correlation matrices, larger values \
+                      favour independence.",
+            ),
         ],
-        "lower triangular arrays of n rows L of length 1, with a diagonal that is not negative",
-        "proportional to det(L L')^(eta - 1) by the correlations: product(L[i][i]^(n - 1 - i + 2 (eta - 1))) by the numbers below the diagonal",
+        "lower triangular arrays of n rows L, each of norm 1, with a non-negative diagonal",
+        "proportional to det(L L')^(eta - 1) with respect to the correlations: product(L[i][i]^(n \
+         - 1 - i + 2 (eta - 1))) with respect to the numbers below the diagonal",
     ),
     family(
         "wishart",
         "The Wishart distribution: the Cholesky factor of a random covariance matrix W, as rows, which `mv_normal` takes as `chol`; the mean of W is df scale_chol scale_chol'.",
         &[
-            p("df", "The degrees of freedom, above the number of rows less 1."),
+            p("df", "The degrees of freedom, above the number of rows minus 1."),
             p("scale_chol", "The lower triangular Cholesky factor of the scale matrix, an array of rows."),
         ],
         "lower triangular arrays of rows L with a positive diagonal, W = L L'",
@@ -269,51 +307,64 @@ pub const FAMILIES: &[Family] = &[
         "The multivariate normal distribution.",
         &[
             p("mean", "The mean vector."),
-            p("cov", "The covariance matrix, an array of rows; or `chol`, one of them."),
+            p("cov", "The covariance matrix, an array of rows; give either `cov` or `chol`."),
             p("chol", "The lower triangular Cholesky factor of the covariance."),
-            p("whitened", "Stores the white noise z of mean + chol z, instead of the value."),
+            p(
+                "whitened",
+                "Non-centred: stores the white noise z of mean + chol z instead of the \
+                           value.",
+            ),
         ],
         "arrays as long as the mean",
         "exp(-(x - mean)' cov^-1 (x - mean) / 2) / sqrt(det(2 pi cov))",
     ),
     family(
         "gp",
-        "A Gaussian process at given points: a random function's values there.",
+        "A Gaussian process at given points: the values of a random function there.",
         &[
-            p("mean", "The mean: one number, or one for each point."),
+            p("mean", "The mean: one number, or one per point."),
             p("cov", "The covariance function."),
             p("at", "The points."),
-            p("centred", "Stores the values, instead of the white noise that makes them."),
-            p("jitter", "What is added to the diagonal of the covariance matrix, as a share of the variance."),
+            p("centred", "Centred: stores the values instead of the underlying white noise."),
+            p(
+                "jitter",
+                "Added to the diagonal of the covariance matrix, as a fraction of the \
+                         variance.",
+            ),
         ],
         "arrays as long as `at`",
-        "mv_normal(mean, K) with K[i][j] = cov(at[i], at[j]), and jitter times the variance more on the diagonal",
+        "mv_normal(mean, K) with K[i][j] = cov(at[i], at[j]), plus jitter times the variance on \
+         the diagonal",
     ),
     family(
         "iid",
-        "Independent values of one distribution.",
-        &[p("d", "A distribution."), p("n", "How many.")],
+        "Independent, identically distributed values.",
+        &[p("d", "A distribution."), p("n", "The number of values.")],
         "arrays of n values of d",
         "the product of the densities of d",
     ),
     family(
         "ordered",
-        "Independent numbers in ascending order, one choice: n of one distribution, or one of each in a list. A list of unlike ones is not normalised, so like `flat` it cannot be drawn from: kernels that redraw choices reject.",
+        "Independent numbers in ascending order, as one choice: n from one distribution, or one \
+         from each in a list. A list of different distributions is not normalised, so like `flat` \
+         it cannot be sampled: kernels that propose from the prior reject.",
         &[
             p("d", "A distribution of continuous numbers, or an array of them."),
-            p("n", "How many; left out for an array of distributions."),
+            p("n", "The number of values; omitted for an array of distributions."),
         ],
         "ascending arrays of n values of d",
-        "n! times the product of the densities of d; of an array, the product of theirs, not divided by the probability of that order (a constant only while their parameters stay)",
+        "n! times the product of the densities of d; for an array, the product of their \
+         densities, not divided by the probability of that order (which is constant only if their \
+         parameters are)",
     ),
     family(
         "mixture",
-        "A value of one of several distributions, it is not known which.",
+        "A mixture: a value from one of several distributions, with the component summed out.",
         &[
-            p("weights", "One weight for each component; they need not sum to 1."),
-            p("components", "Distributions with the same kind of values, an array."),
+            p("weights", "One weight per component; they need not sum to 1."),
+            p("components", "An array of distributions over the same kind of values."),
         ],
-        "that of the components, or the least interval around theirs",
+        "that of the components, or the smallest interval containing theirs",
         "sum(weights[k] / sum(weights) density of components[k])",
     ),
 ];

@@ -38,7 +38,7 @@ impl Gp {
         }
         if mean.len() != at.len() {
             let value = format!("{} for {}", mean.len(), at.len());
-            return Err(ParamError::new("gp", "mean", value, "must have a number for each point"));
+            return Err(ParamError::new("gp", "mean", value, "must have one number per point"));
         }
         if at.len() > MOST_POINTS {
             let rule = "must have at most 4000 points";

@@ -26,7 +26,7 @@ impl Mixture {
         let bad = |parameter, value: String, rule| ParamError::new("mixture", parameter, value, rule);
         if weights.len() != components.len() {
             let value = format!("{} for {}", weights.len(), components.len());
-            return Err(bad("weights", value, "must have a number for each component"));
+            return Err(bad("weights", value, "must have one number per component"));
         }
         let choice = Categorical::new(weights).map_err(|e| ParamError { distribution: "mixture", ..e })?;
         if let Some(c) = components.iter().find(|c| c.is_improper()) {

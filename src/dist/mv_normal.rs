@@ -17,7 +17,15 @@ impl MvNormal {
     /// With this mean and covariance; fails unless the mean is finite and the covariance as large, symmetric (to 1e-9 of its
     /// largest entry) and positive definite.
     pub fn from_cov(mean: &[f64], cov: &DMatrix<f64>) -> Result<MvNormal, ParamError> {
-        let size = || ParamError::new("mv_normal", "cov", shape(cov), "must be square, as large as the mean");
+        let size = || {
+            ParamError::new(
+                "mv_normal",
+                "cov",
+                shape(cov),
+                "must be square and match \
+            the length of the mean",
+            )
+        };
         let packed = lower(cov).filter(|_| cov.nrows() == mean.len()).ok_or_else(size)?;
         if let Some(x) = cov.iter().find(|x| !x.is_finite()) {
             return Err(ParamError::new("mv_normal", "cov", x, "must be finite"));
@@ -36,7 +44,13 @@ impl MvNormal {
     /// as large and finite, with a positive diagonal and zeros above it.
     pub fn from_chol(mean: &[f64], chol: &DMatrix<f64>) -> Result<MvNormal, ParamError> {
         if chol.nrows() != mean.len() || chol.ncols() != mean.len() {
-            return Err(ParamError::new("mv_normal", "chol", shape(chol), "must be square, as large as the mean"));
+            return Err(ParamError::new(
+                "mv_normal",
+                "chol",
+                shape(chol),
+                "must be square and \
+                match the length of the mean",
+            ));
         }
         let n = mean.len();
         if (0..n).any(|j| (0..j).any(|i| chol[(i, j)] != 0.0)) {

@@ -204,21 +204,21 @@ impl fmt::Display for Support {
         match self {
             Support::Real => write!(f, "all finite numbers"),
             Support::Positive => write!(f, "numbers above 0"),
-            Support::AtLeast { lo } => write!(f, "numbers from {lo} up"),
+            Support::AtLeast { lo } => write!(f, "numbers of at least {lo}"),
             Support::Interval { lo, hi } => write!(f, "numbers from {lo} to {hi}"),
-            Support::AtMost { hi } => write!(f, "numbers up to {hi}"),
-            Support::Circle => write!(f, "angles above -pi and up to pi"),
+            Support::AtMost { hi } => write!(f, "numbers of at most {hi}"),
+            Support::Circle => write!(f, "angles in (-pi, pi]"),
             Support::Boolean => write!(f, "true and false"),
             Support::Integers { lo, hi: Some(hi) } => write!(f, "integers from {lo} to {hi}"),
-            Support::Integers { lo, hi: None } => write!(f, "integers from {lo} up"),
-            Support::Simplex(n) => write!(f, "{n} shares that sum to 1"),
+            Support::Integers { lo, hi: None } => write!(f, "integers of at least {lo}"),
+            Support::Simplex(n) => write!(f, "{n} proportions that sum to 1"),
             Support::Vector(n) => write!(f, "vectors of {n} finite numbers"),
             Support::Ascending(one, n) => write!(f, "{n} in ascending order of {one}"),
             Support::CorrelationFactor(n) => write!(f, "Cholesky factors of {n} x {n} correlation matrices"),
             Support::CovarianceFactor(n) => write!(f, "Cholesky factors of {n} x {n} covariance matrices"),
             Support::Counts { total, kinds } => write!(f, "{kinds} counts that sum to {total}"),
             Support::Product(one, n) => write!(f, "{n} of {one}"),
-            Support::Each(all) => write!(f, "{} values, each of its own space", all.len()),
+            Support::Each(all) => write!(f, "{} values, each with its own support", all.len()),
         }
     }
 }

@@ -55,10 +55,13 @@ fn bad(parameter: &'static str, value: String, rule: &'static str) -> ParamError
 /// Why a distribution cannot be truncated.
 fn unknown(d: &Dist) -> ParamError {
     let rule = match d {
-        Dist::Flat(_) => "must be proper: of the flat prior, `flat(lo, hi)` takes the bounds itself",
-        Dist::TruncatedNormal(_) | Dist::Truncated(_) => "must not be truncated already: give all bounds at once",
-        Dist::VonMises(_) => "must not be of angles, which have no ends",
-        d if d.is_scalar() => "must have a distribution function that is known at these parameters",
+        Dist::Flat(_) => "must be proper: for a flat prior, give the bounds to `flat(lo, hi)`",
+        Dist::TruncatedNormal(_) | Dist::Truncated(_) => {
+            "must not be truncated already: give all \
+            bounds in one call"
+        }
+        Dist::VonMises(_) => "must not be a distribution of angles, which have no bounds",
+        d if d.is_scalar() => "must have a computable distribution function for these parameters",
         _ => "must be a distribution of single numbers",
     };
     bad("d", d.name().to_owned(), rule)
@@ -86,14 +89,14 @@ impl Truncated {
             return Err(unknown(&base));
         }
         let nothing = |rule| bad("lo to hi", format!("{lo} and {hi} of {}", base.name()), rule);
-        let outside = "must overlap the numbers that `d` draws";
+        let outside = "must overlap the support of `d`";
         let support = within(&support, lo, hi).ok_or_else(|| nothing(outside))?;
         let mut d = Truncated { base, lo, hi, support, log_mass: 0.0 };
         d.log_mass = d.log_mass_to(f64::INFINITY).ok_or_else(|| unknown(&d.base))?;
         if d.log_mass > f64::NEG_INFINITY {
             Ok(d)
         } else {
-            let rule = "must hold some of the probability of `d`, more than a double can tell from 0";
+            let rule = "must contain some of the probability of `d`, more than the smallest double";
             Err(bad("lo to hi", format!("{lo} and {hi} of {}", d.base.name()), rule))
         }
     }

@@ -150,12 +150,12 @@ impl Mesh {
     pub fn new(positions: Vec<Vec3>, triangles: Vec<[u32; 3]>, parts: Vec<u16>) -> Result<Mesh, GeomError> {
         if triangles.len() > MOST_TRIANGLES {
             return Err(GeomError::invalid(format!(
-                "a mesh of {} triangles; at most {MOST_TRIANGLES}",
+                "the mesh has {} triangles; at most {MOST_TRIANGLES} are allowed",
                 triangles.len()
             )));
         }
         if parts.len() != triangles.len() {
-            return Err(GeomError::invalid("a mesh needs one part number for each triangle"));
+            return Err(GeomError::invalid("a mesh needs one part number per triangle"));
         }
         if parts.contains(&u16::MAX) {
             return Err(GeomError::invalid(format!("a mesh has at most {MOST_PARTS} parts, numbered from 0")));
@@ -169,7 +169,7 @@ impl Mesh {
             return Err(GeomError::invalid(message));
         }
         edges::build(&positions, &triangles, &parts)
-            .ok_or_else(|| GeomError::invalid("the mesh has no triangle with an area"))
+            .ok_or_else(|| GeomError::invalid("all triangles of the mesh have zero area"))
     }
 
     /// The smallest box around it.
@@ -195,7 +195,7 @@ mod tests {
         let e = Mesh::new(p.clone(), vec![[0, 1, 2]], vec![u16::MAX]).unwrap_err().to_string();
         assert_eq!(e, "a mesh has at most 65535 parts, numbered from 0");
         let e = Mesh::new(p, vec![[0, 1, 2]; MOST_TRIANGLES + 1], vec![]).unwrap_err().to_string();
-        assert_eq!(e, "a mesh of 5000001 triangles; at most 5000000");
+        assert_eq!(e, "the mesh has 5000001 triangles; at most 5000000 are allowed");
     }
 
     #[test]

@@ -33,7 +33,12 @@ pub fn load_in(bytes: &[u8], frame: &FileFrame) -> Result<Mesh, GeomError> {
     let (plain, names) = plain(text(bytes)?)?;
     let options = tobj::LoadOptions { triangulate: true, ignore_points: true, ignore_lines: true, single_index: false };
     let no_materials = |_: &std::path::Path| Ok((Vec::new(), Default::default()));
-    let unreadable = |e: &dyn std::fmt::Display| GeomError::invalid(format!("the OBJ file cannot be read: {e}"));
+    let unreadable = |e: &dyn std::fmt::Display| {
+        GeomError::invalid(format!(
+            "cannot read the OBJ \
+        file: {e}"
+        ))
+    };
     let (models, _) = tobj::load_obj_buf(&mut plain.as_bytes(), &options, no_materials).map_err(|e| unreadable(&e))?;
     let (mut positions, mut triangles, mut parts) = (Vec::new(), Vec::new(), Vec::new());
     for m in models.iter().filter(|m| !m.mesh.indices.is_empty()) {
@@ -184,7 +189,7 @@ fn face<'a>(words: impl Iterator<Item = &'a str>, vertices: i64) -> Result<Vec<i
         let v = number.parse::<i64>().map_err(|_| format!("a corner must be the number of a vertex, got `{w}`"))?;
         let place = if v < 0 { vertices.saturating_add(v).saturating_add(1) } else { v };
         if !(1..=vertices).contains(&place) {
-            return Err(format!("there is no vertex {v}; there are {vertices} so far"));
+            return Err(format!("no vertex {v}; {vertices} are defined so far"));
         }
         corners.push(place);
         if corners.len() > MOST_CORNERS {
@@ -240,22 +245,17 @@ mod tests {
         );
         assert_eq!(
             fails("v 0 0 0\nv 1 0 0\nv 0 1 0\nf 1 2 4\n"),
-            "line 4 of the OBJ file: there is no vertex 4; there are 3 so far"
+            "line 4 of the OBJ file: no vertex 4; 3 are defined so far"
         );
-        assert_eq!(fails("f -1 1 2\n"), "line 1 of the OBJ file: there is no vertex -1; there are 0 so far");
+        assert_eq!(fails("f -1 1 2\n"), "line 1 of the OBJ file: no vertex -1; 0 are defined so far");
         assert_eq!(fails("v 1 2\n"), "line 1 of the OBJ file: a vertex needs three coordinates");
         assert_eq!(fails("v 1 1e99 2\n"), "line 1 of the OBJ file: a coordinate must be a finite number, got `1e99`");
         assert_eq!(fails(""), "the OBJ file has no faces");
-        assert_eq!(fails("v 0 0 0\nf 1 1 1\n"), "the mesh has no triangle with an area");
+        assert_eq!(fails("v 0 0 0\nf 1 1 1\n"), "all triangles of the mesh have zero area");
         let three = "v 0 0 0\nv 1 0 0\nv 0 1 0\n";
         assert_eq!(fails(&format!("{three}f 1 2\n")), "line 4 of the OBJ file: a face needs three corners, got 2");
-        assert_eq!(
-            fails(&format!("{three}f 0 1 2\n")),
-            "line 4 of the OBJ file: there is no vertex 0; there are 3 so far"
-        );
-        assert!(
-            fails(&format!("{three}f 1 2 -9223372036854775808\n")).contains("there is no vertex -9223372036854775808")
-        );
+        assert_eq!(fails(&format!("{three}f 0 1 2\n")), "line 4 of the OBJ file: no vertex 0; 3 are defined so far");
+        assert!(fails(&format!("{three}f 1 2 -9223372036854775808\n")).contains("no vertex -9223372036854775808"));
         assert!(fails(&format!("{three}f 1 2 /3\n")).ends_with("a corner must be the number of a vertex, got `/3`"));
         assert!(fails("v 1 1 1 0\n").starts_with("line 1 of the OBJ file: the coordinates divided by 0"));
         assert!(fails("v 3e38 1 1 1e-9\n").contains("not finite"));

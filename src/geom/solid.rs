@@ -336,7 +336,7 @@ impl Solid {
         let count: usize = self.instances.iter().map(|i| i.mesh.topology.triangles.len()).sum();
         if count > MOST_TRIANGLES {
             return Err(GeomError::invalid(format!(
-                "a solid of {count} triangles; at most {MOST_TRIANGLES} in one mesh"
+                "the solid has {count} triangles; at most {MOST_TRIANGLES} are allowed in one mesh"
             )));
         }
         let (mut positions, mut normals, mut t) = (Vec::new(), Vec::new(), Topology::default());

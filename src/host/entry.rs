@@ -175,7 +175,7 @@ impl Entry {
         let mut args = self.builtin.args.to_vec();
         match args.last_mut() {
             Some(a) => a.unit = unit.into(),
-            None => self.wrong = Some("a unit belongs to an argument".into()),
+            None => self.wrong = Some("a unit must belong to an argument".into()),
         }
         self.builtin.args = args.into();
         self
@@ -212,7 +212,11 @@ impl Entry {
         match &mut self.builtin.foreign {
             Some(Foreign::Function { pull, .. } | Foreign::Incremental { pull, .. }) => *pull = Some(Arc::new(product)),
             _ => {
-                self.wrong = Some("only functions take a gradient: distributions and likelihoods have their own".into())
+                self.wrong = Some(
+                    "only functions take a gradient; distributions and likelihoods \
+                                   define their own"
+                        .into(),
+                )
             }
         }
         if let Some(f) = &self.builtin.foreign {
@@ -226,7 +230,7 @@ impl Entry {
     pub fn flat(mut self) -> Entry {
         match &self.builtin.foreign {
             Some(Foreign::Function { .. } | Foreign::Incremental { .. }) => self.builtin.derivative = Derivative::Zero,
-            _ => self.wrong = Some("only functions are flat".into()),
+            _ => self.wrong = Some("only functions can be flat".into()),
         }
         self
     }
@@ -239,7 +243,7 @@ impl Entry {
     /// let sqrt = || Entry::function("sqrt", |a| Ok(Value::Num(a.num(0)?.abs().sqrt()))).argument("x", Type::Num, "A number.");
     /// let program = || Program::parse("let x = sqrt(-4);");
     /// let taken = program()?.host(&Host::new().with(sqrt())).err().unwrap();
-    /// assert!(taken.to_string().contains("`sqrt` is a name of the language"));
+    /// assert!(taken.to_string().contains("`sqrt` is a built-in of the language"));
     /// assert!(program()?.host(&Host::new().with(sqrt().replacing()))?.compile().is_ok());
     /// # Ok::<(), pcadlang::Error>(())
     /// ```
@@ -261,13 +265,16 @@ impl Entry {
         for (i, a) in args.iter().enumerate() {
             let (own, before) = (&a.name, &args[..i]);
             if !is_name(own) || is_keyword(own) {
-                wrong.push(format!("`{own}`, an argument of `{name}`, is no name"));
+                wrong.push(format!("`{own}`, an argument of `{name}`, is not a valid name"));
             }
             if before.iter().any(|b| b.name == *own) {
                 wrong.push(format!("`{name}` has two arguments `{own}`"));
             }
             if a.default.is_none() && before.iter().any(|b| b.default.is_some()) {
-                wrong.push(format!("`{name}`: `{own}` must be given, so it stands before those that need not be"));
+                wrong.push(format!(
+                    "`{name}`: the required argument `{own}` must come before the \
+                                    optional ones"
+                ));
             }
         }
         wrong

@@ -95,13 +95,17 @@ impl Host {
             let taken = own.find("", name).is_some() || own.constant(name).is_some();
             if !is_name(name) || is_keyword(name) {
                 wrong(
-                    format!("`{name}` cannot be the name of a host's function"),
-                    "a letter or `_`, then letters, digits and `_`; no word of the grammar",
+                    format!("`{name}` is not a valid name for a host function"),
+                    "a name is a letter or `_`, then letters, digits and `_`, and not a keyword",
                 );
             } else if own.constant(name).is_some() || taken && !e.replaces {
-                wrong(format!("`{name}` is a name of the language"), "take another; functions can be `replacing()`");
+                wrong(
+                    format!("`{name}` is a built-in of the language"),
+                    "choose another name; \
+                    functions can be `replacing()`",
+                );
             } else if self.entries[..i].iter().any(|o| o.builtin.name == b.name) {
-                wrong(format!("the host brings `{name}` twice"), "");
+                wrong(format!("the host registers `{name}` twice"), "");
             }
             if let Some(what) = &e.wrong {
                 wrong(format!("`{name}`: {what}"), "");

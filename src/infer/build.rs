@@ -36,7 +36,7 @@ pub(super) fn build(
     env: &mut Scope,
 ) -> Result<Built, Box<RunError>> {
     let Some((name, args)) = call(e) else {
-        return Err(fail(e.span, "a kernel such as mh(one(@**)) was expected".into()));
+        return Err(fail(e.span, "expected a kernel, such as mh(one(@**))".into()));
     };
     if let Some(k) = env.code.kernels.iter().find(|k| &*k.name.node == name) {
         let arguments = arguments(k, args, e.span, env)?;
@@ -53,7 +53,7 @@ pub(super) fn build(
     }
     if known.is_some_and(|b| b.is_planned()) {
         let mut e = fail(e.span, format!("the kernel `{name}` is not available yet in this version"));
-        e.hint = Some(format!("those that are: {AVAILABLE}"));
+        e.hint = Some(format!("available kernels: {AVAILABLE}"));
         return Err(e);
     }
     let Some(first) = args.first() else {
@@ -79,7 +79,14 @@ pub(super) fn build(
     }
     if name == "delayed" {
         let inner = build(&first.value, frozen, options, env)?;
-        let at = argument(args, 1, "at").ok_or_else(|| fail(e.span, "delayed needs an observation, `at`".into()))?;
+        let at = argument(args, 1, "at").ok_or_else(|| {
+            fail(
+                e.span,
+                "delayed needs an \
+            observation, given as `at`"
+                    .into(),
+            )
+        })?;
         let observations = selector(at, env)?;
         let signature = format!("delayed({}, {observations:?})", inner.signature);
         let kernel = Delayed::new(inner.kernel, observations, e.span);
@@ -88,7 +95,14 @@ pub(super) fn build(
     if name == "abc" {
         let inner = build(&first.value, frozen, options, env)?;
         let eps = positive(argument(args, 1, "eps"), name, "eps", env)?;
-        let eps = eps.ok_or_else(|| fail(e.span, "abc needs the largest distance that is accepted, `eps`".into()))?;
+        let eps = eps.ok_or_else(|| {
+            fail(
+                e.span,
+                "abc needs the tolerance `eps`, the largest \
+            accepted distance"
+                    .into(),
+            )
+        })?;
         let Some(particles) = argument(args, 2, "particles") else {
             let signature = format!("abc({}, {eps})", inner.signature);
             return Ok(Built { kernel: Box::new(Abc::new(inner.kernel, eps, e.span)), signature });
@@ -139,7 +153,7 @@ pub(super) fn build(
             let coarse = argument(args, 5, "at").map_or(Ok(Selector::Nothing), |e| selector(e, env))?;
             Box::new(Modes::new(scope, tries, keep, steps).climbing_first(first).by_surrogates_of(coarse))
         }
-        _ => return Err(fail(e.span, format!("`{name}` is no kernel"))),
+        _ => return Err(fail(e.span, format!("`{name}` is not a kernel"))),
     };
     Ok(Built { kernel, signature })
 }
@@ -192,7 +206,7 @@ fn truth(e: Option<&Expr>, name: &str, env: &mut Scope) -> Result<bool, Box<RunE
     let Some(e) = e else { return Ok(false) };
     match evaluate(e, env)? {
         Value::Bool(b) => Ok(b),
-        v => Err(fail(e.span, format!("`{name}` is true or false, got {v}"))),
+        v => Err(fail(e.span, format!("`{name}` must be true or false, got {v}"))),
     }
 }
 
@@ -208,7 +222,13 @@ fn whole(
     let Some(e) = e else { return Ok(default) };
     match evaluate(e, env)? {
         Value::Num(x) if x >= f64::from(least) && x <= f64::from(most) && x == libm::trunc(x) => Ok(x as u32),
-        v => Err(fail(e.span, format!("`{name}` is a whole number from {least} to {most}, got {v}"))),
+        v => Err(fail(
+            e.span,
+            format!(
+                "`{name}` must be a whole number from {least} to {most}, \
+                                       got {v}"
+            ),
+        )),
     }
 }
 

@@ -85,7 +85,15 @@ pub(crate) fn evaluate(e: &Expr, env: &mut Scope) -> Result<Value, Box<RunError>
                         return Ok(v.clone());
                     }
                     let found = env.trace.find(&at).map(|t| env.trace.value(t));
-                    return found.ok_or_else(|| fail(arg.value.span, format!("there is no choice {at} in this state")));
+                    return found.ok_or_else(|| {
+                        fail(
+                            arg.value.span,
+                            format!(
+                                "this state has no \
+                        choice {at}"
+                            ),
+                        )
+                    });
                 }
                 "log_joint" | "log_prior" | "log_likelihood" if env.moved.is_some() => return Err(unmapped(e)),
                 "log_joint" => return Ok(Value::Num(env.trace.log_joint())),
@@ -106,7 +114,7 @@ pub(crate) fn evaluate(e: &Expr, env: &mut Scope) -> Result<Value, Box<RunError>
             let taken = match evaluate(cond, env)? {
                 Value::Bool(true) => then,
                 Value::Bool(false) => otherwise,
-                v => return Err(fail(cond.span, format!("a condition is a bool, got {}", v.type_name()))),
+                v => return Err(fail(cond.span, format!("a condition must be a bool, got {}", v.type_name()))),
             };
             match (&taken.stmts[..], &taken.result) {
                 ([], Some(result)) => evaluate(result, env),
@@ -126,7 +134,7 @@ fn variable(name: &Arc<str>, e: &Expr, env: &mut Scope) -> Result<Value, Box<Run
     }
     match env.trace.global(name, env.draws) {
         Some(v) => v,
-        None => Err(fail(e.span, format!("`{name}` is not known here"))),
+        None => Err(fail(e.span, format!("unknown name `{name}`"))),
     }
 }
 
@@ -138,7 +146,7 @@ fn builtin(name: &str, values: &[&Value], e: &Expr, env: &Scope) -> Result<Value
 fn known<'a>(name: &str, e: &Expr, env: &'a Scope) -> Result<&'a Builtin, Box<RunError>> {
     let builtins = &env.code.builtins;
     let found = builtins.find("", name).map(|i| builtins.get(i));
-    found.ok_or_else(|| fail(e.span, format!("`{name}` is not known here")))
+    found.ok_or_else(|| fail(e.span, format!("unknown name `{name}`")))
 }
 
 fn apply(b: &Builtin, values: &[&Value], e: &Expr) -> Result<Value, Box<RunError>> {
@@ -148,13 +156,18 @@ fn apply(b: &Builtin, values: &[&Value], e: &Expr) -> Result<Value, Box<RunError
             Ok(d) => Ok(Value::Dist(Arc::new(d))),
             Err(f) => Err(Box::new(RunError { kind: f.kind, ..*fault(e.span, f) })),
         },
-        _ => Err(fail(e.span, format!("`{}` is not available in this place", b.name))),
+        _ => Err(fail(e.span, format!("`{}` is not available here", b.name))),
     }
 }
 
 fn unmapped(e: &Expr) -> Box<RunError> {
-    let mut error = fail(e.span, "a map reads choices and constants alone, so that its derivatives are known".into());
-    error.hint = Some("write it with value(@x) of the choices it is made of".into());
+    let mut error = fail(
+        e.span,
+        "a map may use only choices and constants, so that its \
+                                  derivatives are known"
+            .into(),
+    );
+    error.hint = Some("write it in terms of value(@x) of the choices it depends on".into());
     error
 }
 

@@ -35,9 +35,9 @@ pub(crate) fn put(forces: &[Force], trace: &mut Trace, draws: Draws) -> Result<(
         };
         let Some(target) = trace.find(&address) else {
             let known: Vec<String> = trace.choices().iter().map(|(a, _, _)| a.to_string()).collect();
-            let mut e = fail(f.span, format!("there is no choice {address} among those the observations ask for"));
+            let mut e = fail(f.span, format!("no observation depends on a choice {address}"));
             let near = crate::diag::nearest(&address.to_string(), known.iter().map(String::as_str));
-            let all = || format!("there are {}", known[..known.len().min(8)].join(", "));
+            let all = || format!("the choices are {}", known[..known.len().min(8)].join(", "));
             e.hint = Some(near.map_or_else(all, |n| format!("did you mean {n}?")));
             return Err(e);
         };
@@ -52,7 +52,13 @@ pub(crate) fn put(forces: &[Force], trace: &mut Trace, draws: Draws) -> Result<(
         trace.propose(&[(target, Change::Set(datum))], draws)?;
         trace.commit();
         if trace.log_prior() == f64::NEG_INFINITY {
-            return Err(fail(f.span, format!("{address} cannot be {value}: its prior density there is zero")));
+            return Err(fail(
+                f.span,
+                format!(
+                    "{address} cannot be {value}: its prior density is \
+                zero there"
+                ),
+            ));
         }
     }
     Ok(())

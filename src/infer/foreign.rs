@@ -101,7 +101,7 @@ pub(super) fn build_foreign(
     let mut call = KernelCall { args: Args { builtin, values: &values }, scopes, kernels };
     let made = match maker.downcast_ref::<KernelMaker>() {
         Some(maker) => (maker.0)(&mut call),
-        None => Err(Fault::type_error(format!("`{}` is no kernel", builtin.full_name()))),
+        None => Err(Fault::type_error(format!("`{}` is not a kernel", builtin.full_name()))),
     };
     Ok(Built { kernel: made.map_err(|f| fault(e.span, f))?, signature })
 }

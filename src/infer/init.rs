@@ -72,7 +72,7 @@ pub struct ZeroTerm {
 
 impl fmt::Display for NoStart {
     fn fmt(&self, f: &mut fmt::Formatter<'_>) -> fmt::Result {
-        write!(f, "every one of {RETRIES} draws from the prior has probability zero")
+        write!(f, "all {RETRIES} draws from the prior have probability zero")
     }
 }
 
@@ -193,7 +193,7 @@ pub(crate) fn start_of(
         let mut env = Scope { code, trace: &mut trace, variables: &[], draws, started, steps: 0, moved: None };
         match evaluate(e, &mut env)? {
             Value::Num(x) if x >= 1.0 => Ok(x as u64),
-            v => Err(ChainError::Run(fail(e.span, format!("a number of draws was expected, got {v}")))),
+            v => Err(ChainError::Run(fail(e.span, format!("expected a number of draws, got {v}")))),
         }
     };
     match call(&how.value) {
@@ -211,7 +211,7 @@ pub(crate) fn start_of(
 /// The kernel of the program that a start is proposed by.
 fn own(code: &Arc<Code>, e: &Expr, options: &RunOptions) -> Result<Own, ChainError> {
     let wrong = || {
-        let mut wrong = fail(e.span, "a start is proposed by a kernel of the program".into());
+        let mut wrong = fail(e.span, "`from` takes a kernel declared in the program".into());
         wrong.hint =
             Some("kernel near() { propose @x ~ normal(2, 0.1); } infer { init(best_of(20, from = near())); … }".into());
         ChainError::Run(wrong)

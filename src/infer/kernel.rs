@@ -130,7 +130,7 @@ pub trait Kernel: Send {
     fn load(&mut self, state: &[u8]) -> Result<(), StateError> {
         match state {
             [] => Ok(()),
-            _ => Err(StateError::new(format!("{} remembers nothing", self.name()))),
+            _ => Err(StateError::new(format!("{} has no state", self.name()))),
         }
     }
 

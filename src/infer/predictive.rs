@@ -99,7 +99,7 @@ fn grouped(values: Vec<(Address, Value)>) -> Replication {
     for (address, value) in values {
         let (name, numbers) = (keyless(&address), value.numbers());
         if numbers.is_empty() {
-            silent.push((name, format!("{}, which is not made of numbers", value.type_name())));
+            silent.push((name, format!("{}, which is not numeric", value.type_name())));
         } else {
             groups.entry(name).or_default().extend(numbers);
         }

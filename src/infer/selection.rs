@@ -120,7 +120,7 @@ pub(crate) fn pattern(a: &ast::Address, env: &mut Scope) -> Result<Pattern, Box<
                 ast::Key::Expr(e) => {
                     let v = evaluate(e, env)?;
                     let key = Key::from_value(&v);
-                    Some(key.ok_or_else(|| fail(e.span, format!("{} cannot be a key", v.type_name())))?)
+                    Some(key.ok_or_else(|| fail(e.span, format!("{} cannot be used as a key", v.type_name())))?)
                 }
             });
         }
@@ -134,7 +134,7 @@ pub(crate) fn pattern(a: &ast::Address, env: &mut Scope) -> Result<Pattern, Box<
 /// # Errors
 /// If it has wildcards, or a computed key fails or is not a key.
 pub(crate) fn address(e: &Expr, env: &mut Scope) -> Result<Address, Box<RunError>> {
-    let one = || fail(e.span, "the address of one choice was expected, without wildcards".into());
+    let one = || fail(e.span, "expected the address of a single choice, without wildcards".into());
     let ExprKind::Address(a) = &e.kind else { return Err(one()) };
     let mut segments = Vec::with_capacity(a.segments.len());
     for s in pattern(a, env)?.segments {
@@ -147,7 +147,11 @@ pub(crate) fn address(e: &Expr, env: &mut Scope) -> Result<Address, Box<RunError
 
 fn not_a_selection(span: Span) -> Box<RunError> {
     let mut e = fail(span, "expected a selection of choices".into());
-    e.hint = Some("an address such as @**, a tag such as $affine, or both joined by +, - or &".into());
+    e.hint = Some(
+        "an address such as @**, a tag such as $affine, or a combination of these with \
+                   +, - or &"
+            .into(),
+    );
     e
 }
 

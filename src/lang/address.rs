@@ -94,7 +94,10 @@ pub(crate) fn is_numbered(name: &str) -> bool {
 
 /// A text that is not an address.
 #[derive(Clone, Debug, PartialEq, Eq, thiserror::Error)]
-#[error("`{text}` is not an address: {expected} was expected at byte {at}; one looks like @pose[arm_l]/bone#2/rot[0]")]
+#[error(
+    "`{text}` is not an address: expected {expected} at byte {at}; an example of an address \
+         is @pose[arm_l]/bone#2/rot[0]"
+)]
 pub struct AddressTextError {
     /// The text.
     pub text: String,

@@ -28,23 +28,25 @@ pub(crate) fn likelihood_score(v: &Value, observed: &Value) -> Result<f64, Fault
     let Value::Likelihood(l) = v else { return Err(Fault::type_error("not a likelihood")) };
     let score = l.log_density(observed).map_err(Fault::type_error)?;
     if score.is_nan() {
-        return Err(Fault::domain(format!("the likelihood `{}` is not a number here", l.name())));
+        return Err(Fault::domain(format!("the likelihood `{}` is NaN here", l.name())));
     }
     Ok(score)
 }
 
 /// Scores a value, element by element where the distribution is over single numbers and the value is an array.
 pub(crate) fn score(dist: &Dist, observed: &Value) -> Result<Score, Fault> {
-    let wrong = || Fault::type_error(format!("`{}` cannot be observed to be {}", dist.name(), observed.type_name()));
+    let wrong = || Fault::type_error(format!("a value of `{}` cannot be {}", dist.name(), observed.type_name()));
     if let Some(count) = dist.elements() {
         if observed.len() != Some(count) {
             let got = observed.len().map_or(observed.type_name().to_owned(), |l| format!("{l} values"));
-            return Err(Fault::type_error(format!("the distribution has {count} elements, but {got} are observed")));
+            return Err(Fault::type_error(format!(
+                "expected {count} observed values, one per element of the distribution, got {got}"
+            )));
         }
         return sum_scores(count, |i| {
             let x = observed.element(i).as_ref().and_then(Value::to_datum).ok_or_else(wrong)?;
             if matches!(x, Datum::Num(x) if x.is_nan()) {
-                return Err(Fault::domain(format!("element {i} of what is observed is not a number")));
+                return Err(Fault::domain(format!("element {i} of the observed value is not a number")));
             }
             Ok(dist.element_log_density(i, &x))
         });

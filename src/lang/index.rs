@@ -27,10 +27,10 @@ pub fn index_value(base: &Value, key: &Value) -> Result<Value, Fault> {
             .field(name)
             .ok_or_else(|| Fault::new(FaultKind::Index, format!("{} has no field `{name}`", o.type_name()))),
         (Value::Array(_) | Value::List(_), k) => {
-            Err(Fault::type_error(format!("an array is indexed by a number, not by {}", k.type_name())))
+            Err(Fault::type_error(format!("an array index must be a number, not {}", k.type_name())))
         }
         (Value::Record(_), k) => {
-            Err(Fault::type_error(format!("a record is indexed by a name, not by {}", k.type_name())))
+            Err(Fault::type_error(format!("a record index must be a name, not {}", k.type_name())))
         }
         (b, _) => Err(Fault::type_error(format!("{} has no elements or fields", b.type_name()))),
     }
@@ -43,14 +43,14 @@ fn position(base: &Value, x: f64) -> Result<Value, Fault> {
         return base.element(i).map_or_else(|| fail("no such element".into()), Ok);
     }
     if x != libm::trunc(x) {
-        let message = format!("an array is indexed by a whole number, got {x}");
+        let message = format!("an array index must be a whole number, got {x}");
         return Err(Fault::new(FaultKind::Index, message).with_hint("floor(x) and round(x) give one"));
     }
     let range = match len {
         0 => "it is empty".to_owned(),
         _ => format!("its indices run from 0 to {}", len - 1),
     };
-    Err(Fault::new(FaultKind::Index, format!("no element {x} in an array of {len}")).with_hint(range))
+    Err(Fault::new(FaultKind::Index, format!("no element {x} in an array of length {len}")).with_hint(range))
 }
 
 /// The index that `x` is into so many elements.

@@ -158,7 +158,7 @@ pub fn shipped() -> impl Iterator<Item = &'static str> {
 /// Why a file could not be read, without the number of the operating system's error.
 pub fn reason(e: &io::Error) -> String {
     match e.kind() {
-        io::ErrorKind::NotFound => "there is no such file".into(),
+        io::ErrorKind::NotFound => "no such file".into(),
         io::ErrorKind::PermissionDenied => "permission denied".into(),
         io::ErrorKind::IsADirectory => "it is a folder".into(),
         _ => e.to_string(),
@@ -253,7 +253,7 @@ impl Loading<'_> {
         };
         if let Some(i) = self.stack.iter().position(|p| *p == path) {
             let way = self.stack[i..].join(" -> ");
-            let d = Diagnostic::error("files include each other in a circle", span, format!("{path} is being loaded"));
+            let d = Diagnostic::error("files include each other in a cycle", span, format!("{path} is being loaded"));
             self.errors.push(d.note(format!("{way} -> {path}")));
             return None;
         }

@@ -26,7 +26,7 @@ pub struct Outside {
 
 impl fmt::Display for Outside {
     fn fmt(&self, f: &mut fmt::Formatter<'_>) -> fmt::Result {
-        write!(f, "it is outside of the folders that the program may read")
+        write!(f, "it is outside the folders that the program may read")
     }
 }
 
@@ -37,7 +37,8 @@ impl Outside {
     pub fn hint(e: &io::Error) -> Option<String> {
         let refused = e.get_ref()?.downcast_ref::<Outside>()?;
         Some(format!(
-            "a program reads below its own folder; --allow-read {} lets it read there too",
+            "a program may read only files in its own folder and below; --allow-read {} allows \
+             this folder too",
             refused.folder.display()
         ))
     }
@@ -96,7 +97,7 @@ impl Loader for Reach {
         let found = real.metadata()?;
         // A pipe would wait for ever.
         if !found.is_file() && !found.is_dir() {
-            return Err(io::Error::other("it is no plain file"));
+            return Err(io::Error::other("it is not a regular file"));
         }
         read_file(&real)
     }

@@ -53,19 +53,19 @@ impl<'a> Entry<'a> {
     fn size(&self, i: usize, default: i32) -> Fit<usize> {
         match usize::try_from(self.number(i, default)?) {
             Ok(n @ 1..=LONGEST) => Ok(n),
-            _ => Err("a window or a step is of an impossible size".into()),
+            _ => Err("a window or stride has an invalid size".into()),
         }
     }
 
     /// A window of this size; options have the padding first, then the steps along columns and rows.
     fn window(&self, size: [usize; 2]) -> Fit<Window> {
         if size.iter().any(|s| !(1..=LONGEST).contains(s)) {
-            return Err("a window is of an impossible size".into());
+            return Err("a window has an invalid size".into());
         }
         let same = match self.byte(0)? {
             0 => true,
             1 => false,
-            _ => return Err("its padding is not known".into()),
+            _ => return Err("unknown padding".into()),
         };
         Ok(Window { size, stride: [self.size(2, 1)?, self.size(1, 1)?], same })
     }
@@ -75,7 +75,7 @@ impl<'a> Entry<'a> {
             0 => Ok(Clip { lo: f32::NEG_INFINITY, hi: f32::INFINITY }),
             1 => Ok(Clip { lo: 0.0, hi: f32::INFINITY }),
             3 => Ok(Clip { lo: 0.0, hi: 6.0 }),
-            _ => Err("its activation is not known".into()),
+            _ => Err("unknown activation".into()),
         }
     }
 }
@@ -85,19 +85,33 @@ impl File<'_> {
     pub fn operator(&mut self, e: &Entry) -> Fit<(Operator, Vec<usize>)> {
         let first = *e.inputs.first().ok_or("it has no input")?;
         let (input, output) = (self.shapes[first].clone(), self.shapes[e.output].clone());
-        let pictures = || Size::of(&input).zip(Size::of(&output)).ok_or("its tensors are not single pictures");
+        let pictures = || {
+            Size::of(&input).zip(Size::of(&output)).ok_or(
+                "its tensors are not \
+            single images",
+            )
+        };
         let one = |operator: Operator| Ok((operator, vec![first]));
-        let fits = |holds: bool| if holds { Ok(()) } else { Err(Unfit::from("its tensors do not fit together")) };
+        let fits = |holds: bool| {
+            if holds {
+                Ok(())
+            } else {
+                Err(Unfit::from(
+                    "the shapes of its \
+            tensors do not match",
+                ))
+            }
+        };
         match e.code {
             code::CONVOLUTION | code::DEPTHWISE => {
                 let (from, to) = pictures()?;
                 let [dilation_at, clip_at] = if e.code == code::CONVOLUTION { [4, 3] } else { [5, 4] };
                 if (e.number(dilation_at, 1)?, e.number(dilation_at + 1, 1)?) != (1, 1) {
-                    return Err("it is dilated".into());
+                    return Err("dilation is not supported".into());
                 }
                 let [_, weights, ..] = e.inputs[..] else { return Err("it has no weights".into()) };
                 let [outer, height, width, inner] = self.shapes[weights][..] else {
-                    return Err("its weights have not four dimensions".into());
+                    return Err("its weights do not have four dimensions".into());
                 };
                 let window = e.window([height, width])?;
                 fits(window.output(from, to.channels) == Some(to))?;
@@ -115,7 +129,7 @@ impl File<'_> {
                 let (from, to) = pictures()?;
                 let [_, weights, _] = e.inputs[..] else { return Err("it has no weights and biases".into()) };
                 let [outer, height, width, inner] = self.shapes[weights][..] else {
-                    return Err("its weights have not four dimensions".into());
+                    return Err("its weights do not have four dimensions".into());
                 };
                 let stride = [to.height / from.height, to.width / from.width];
                 fits(stride.iter().all(|s| (1..=LONGEST).contains(s)))?;
@@ -129,10 +143,10 @@ impl File<'_> {
             }
             code::PAD => {
                 let (from, to) = pictures()?;
-                let [_, by] = e.inputs[..] else { return Err("it has no widths".into()) };
+                let [_, by] = e.inputs[..] else { return Err("it has no padding widths".into()) };
                 let by: Vec<usize> = self.integers(by)?.into_iter().filter_map(|p| usize::try_from(p).ok()).collect();
                 let [0, 0, top, bottom, left, right, near, far] = by[..] else {
-                    return Err("its widths are not those of a picture".into());
+                    return Err("its padding widths are not those of an image".into());
                 };
                 let sides = [(from.height, top, bottom), (from.width, left, right), (from.channels, near, far)];
                 let padded = sides.map(|(n, a, b)| n.checked_add(a).and_then(|n| n.checked_add(b)));
@@ -146,7 +160,7 @@ impl File<'_> {
                 one(Operator::Pool { window, largest: e.code == code::MAX_POOL, clip: e.clip(5)? })
             }
             code::MEAN => {
-                let from = Size::of(&input).ok_or("its input is not a picture")?;
+                let from = Size::of(&input).ok_or("its input is not an image")?;
                 let [_, axes] = e.inputs[..] else { return Err("it has no axes".into()) };
                 fits(self.integers(axes)? == [1, 2] && output.iter().product::<usize>() == from.channels)?;
                 one(Operator::Mean)
@@ -170,8 +184,10 @@ impl File<'_> {
             code::CONCATENATION => {
                 let axis = e.number(0, 0)?;
                 let axis = if axis < 0 { axis + output.len() as i32 } else { axis };
-                let along =
-                    usize::try_from(axis).ok().filter(|a| *a < output.len()).ok_or("its dimension is not there")?;
+                let along = usize::try_from(axis).ok().filter(|a| *a < output.len()).ok_or(
+                    "its dimension \
+                        does not exist",
+                )?;
                 let mut whole = 0;
                 for t in &e.inputs {
                     let shape = &self.shapes[*t];
@@ -182,11 +198,11 @@ impl File<'_> {
                 fits(whole == output[along])?;
                 match e.byte(1)? {
                     0 => Ok((Operator::Concatenate(along), e.inputs.clone())),
-                    _ => Err("its activation is not known".into()),
+                    _ => Err("unknown activation".into()),
                 }
             }
             code::ADD | code::MULTIPLY => {
-                let [a, b] = e.inputs[..] else { return Err("it has not two inputs".into()) };
+                let [a, b] = e.inputs[..] else { return Err("it does not have two inputs".into()) };
                 let (a_shape, b_shape) = (&self.shapes[a], &self.shapes[b]);
                 let (long, short) = if a_shape.iter().product::<usize>() >= b_shape.iter().product::<usize>() {
                     (a_shape, b_shape)
@@ -213,7 +229,7 @@ impl File<'_> {
                     _ => Operator::HardSwish,
                 })
             }
-            _ => Err("it is not one of those that networks of people have".into()),
+            _ => Err("unsupported operator".into()),
         }
     }
 
@@ -221,6 +237,12 @@ impl File<'_> {
     fn biases(&mut self, e: &Entry, channels: usize) -> Fit<Vec<f32>> {
         let Some(t) = e.inputs.get(2) else { return Ok(vec![0.0; channels]) };
         let biases = self.numbers(*t)?;
-        if biases.len() == channels { Ok(biases) } else { Err("its biases do not fit its channels".into()) }
+        if biases.len() == channels {
+            Ok(biases)
+        } else {
+            Err("the number of biases does not \
+            match its channels"
+                .into())
+        }
     }
 }

@@ -32,12 +32,17 @@ pub(super) fn read(bytes: &[u8]) -> Result<Network> {
     let model = Table::root(bytes, *b"TFL3")?;
     let codes = model.tables(field::CODES)?;
     let graphs = model.tables(field::GRAPHS)?;
-    let [graph] = &graphs[..] else { return Err(format("it has not one graph")) };
+    let [graph] = &graphs[..] else { return Err(format("expected exactly one graph")) };
     let tensors = graph.tables(field::graph::TENSORS)?;
     let shapes: Vec<Vec<usize>> = tensors.iter().map(shape).collect::<Result<_>>()?;
     let buffers = model.tables(field::BUFFERS)?;
     let mut file = File { tensors, buffers, shapes, same: HashMap::new(), left: MOST_NUMBERS };
-    let [input] = graph.indices(field::graph::INPUTS)?[..] else { return Err(format("it has not one input")) };
+    let [input] = graph.indices(field::graph::INPUTS)?[..] else {
+        return Err(format(
+            "expected \
+        exactly one input",
+        ));
+    };
     file.check(input)?;
 
     let (mut steps, mut filled, mut constants) = (Vec::<Step>::new(), HashSet::from([input]), HashMap::new());
@@ -49,7 +54,7 @@ pub(super) fn read(bytes: &[u8]) -> Result<Network> {
         if matches!(entry.code, code::DEQUANTIZE | code::DENSIFY) {
             let from = *entry.inputs.first().ok_or_else(|| wrong("it has no input"))?;
             if filled.contains(&from) || file.same.insert(entry.output, from).is_some() || entry.output == from {
-                return Err(wrong("it is not of a constant"));
+                return Err(wrong("its input is not a constant"));
             }
             continue;
         }
@@ -63,14 +68,14 @@ pub(super) fn read(bytes: &[u8]) -> Result<Network> {
             }
         }
         if !filled.insert(entry.output) {
-            return Err(wrong("it fills a tensor that is there"));
+            return Err(wrong("it overwrites an existing tensor"));
         }
         let read: Vec<&[usize]> = inputs.iter().map(|t| &file.shapes[*t][..]).collect();
         let size: usize = file.shapes[entry.output].iter().product();
         computed = computed.saturating_add(size);
         work = work.saturating_add(operator.work(&read, size));
         if computed > MOST_COMPUTED || work > MOST_WORK {
-            return Err(NetworkError::TooLarge("it takes too many operations".into()));
+            return Err(NetworkError::TooLarge("it needs too many operations".into()));
         }
         steps.push(Step { operator, inputs, output: entry.output });
     }
@@ -106,7 +111,7 @@ fn name(entry: &Entry) -> String {
 
 impl File<'_> {
     fn entry<'t>(&self, codes: &[Table<'t>], table: &Table<'t>) -> Result<Entry<'t>> {
-        let absent = || format("an operator is of a kind that is not there");
+        let absent = || format("an operator has an undefined code");
         let kind = codes.get(table.index(field::operator::CODE)?).ok_or_else(absent)?;
         // Files that are older have the number in a byte.
         let code = kind.i32(field::code::LONG, 0)?.max(i32::from(kind.u8(field::code::SHORT)? as i8));
@@ -114,14 +119,19 @@ impl File<'_> {
         // An input that is left out is -1.
         let inputs: Vec<usize> = inputs.filter_map(|i| usize::try_from(i).ok()).collect();
         let outputs = table.indices(field::operator::OUTPUTS)?;
-        let [output] = outputs[..] else { return Err(format("an operator has not one output")) };
+        let [output] = outputs[..] else {
+            return Err(format(
+                "an operator does not have exactly \
+            one output",
+            ));
+        };
         inputs.iter().chain([&output]).try_for_each(|t| self.check(*t))?;
         let custom = kind.bytes(field::code::CUSTOM)?;
         Ok(Entry { code, custom, options: table.table(field::operator::OPTIONS)?, inputs, output })
     }
 
     fn check(&self, tensor: usize) -> Result<()> {
-        if tensor < self.shapes.len() { Ok(()) } else { Err(format("a tensor is not there")) }
+        if tensor < self.shapes.len() { Ok(()) } else { Err(format("a tensor is missing")) }
     }
 
     /// The bytes of a constant and its tensor, in the form that the file has it in.
@@ -131,12 +141,12 @@ impl File<'_> {
                 Some(from) => tensor = *from,
                 None => {
                     let buffer = self.tensors[tensor].index(field::tensor::BUFFER)?;
-                    let buffer = self.buffers.get(buffer).ok_or_else(|| format("a buffer is not there"))?;
+                    let buffer = self.buffers.get(buffer).ok_or_else(|| format("a buffer is missing"))?;
                     return Ok((tensor, buffer.bytes(0)?));
                 }
             }
         }
-        Err(format("a constant is itself in another form"))
+        Err(format("a constant is stored indirectly"))
     }
 
     /// The numbers of a constant.
@@ -150,7 +160,7 @@ impl File<'_> {
                 let halves: Vec<half::f16> = halves.collect();
                 halves.to_f32_vec()
             }
-            _ => return Err(format("a constant is not of 32 or 16 bit numbers")),
+            _ => return Err(format("a constant is not of 32- or 16-bit floats")),
         };
         let size: usize = shape.iter().product();
         self.left = self.left.checked_sub(size).ok_or_else(|| NetworkError::TooLarge("its constants".into()))?;
@@ -160,7 +170,7 @@ impl File<'_> {
         };
         let is_whole = values.len() == size && size == self.shapes[tensor].iter().product::<usize>();
         if !is_whole {
-            return Err(format("a constant has another number of values than its shape"));
+            return Err(format("the number of values of a constant does not match its shape"));
         }
         if values.iter().any(|v| !v.is_finite()) {
             return Err(format("a constant is not finite"));
@@ -173,7 +183,7 @@ impl File<'_> {
         let (from, bytes) = self.constant(tensor)?;
         match self.tensors[from].u8(field::tensor::KIND)? {
             2 => Ok(bytes.chunks_exact(4).map(|b| i32::from_le_bytes([b[0], b[1], b[2], b[3]])).collect()),
-            _ => Err(format("a constant is not of whole numbers")),
+            _ => Err(format("a constant is not of integers")),
         }
     }
 }

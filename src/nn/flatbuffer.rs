@@ -15,7 +15,7 @@ pub(super) struct Table<'a> {
 }
 
 fn cut() -> NetworkError {
-    NetworkError::Format("an offset leads out of the file".into())
+    NetworkError::Format("an offset points outside the file".into())
 }
 
 fn bytes_at<const N: usize>(file: &[u8], at: usize) -> Result<[u8; N]> {
@@ -42,7 +42,7 @@ impl<'a> Table<'a> {
     pub fn root(file: &'a [u8], identifier: [u8; 4]) -> Result<Table<'a>> {
         if bytes_at(file, 4).ok() != Some(identifier) {
             let name = String::from_utf8_lossy(&identifier);
-            return Err(NetworkError::Format(format!("its fifth to eighth bytes are not {name}")));
+            return Err(NetworkError::Format(format!("bytes 5 to 8 are not {name}")));
         }
         Table::new(file, follow(file, 0)?)
     }

@@ -23,7 +23,7 @@ pub use operator::sigmoid;
 #[derive(Clone, Debug, PartialEq, Eq, thiserror::Error)]
 pub enum NetworkError {
     /// The file is cut short, or not of the format.
-    #[error("not a TFLite file that can be read: {0}")]
+    #[error("not a readable TFLite file: {0}")]
     Format(String),
     /// An operator, by its place in the file, is not one of those that are known, or does not fit its tensors.
     #[error("operator {index} of the network, {name}: {why}")]

@@ -51,7 +51,7 @@ impl<'a> Layout<'a> {
         let mut sorted = order.clone();
         sorted.sort_unstable();
         if sorted != (0..shape.len() + map.len()).collect::<Vec<_>>() || dimensions.len() != order.len() {
-            return Err(bad("is traversed in an order that is none"));
+            return Err(bad("has an invalid traversal order"));
         }
         // The size of blocks along each dimension; a block's own dimensions are dense.
         let mut block = vec![1; shape.len()];
@@ -73,7 +73,7 @@ impl<'a> Layout<'a> {
             along.push((d, step));
             levels.push(match table.u8(FORMAT)? {
                 0 if table.index(DENSE_SIZE)? == size => Level::Dense(size),
-                0 => return Err(bad("has a dimension of another size than its shape")),
+                0 => return Err(bad("has a dimension that does not match its shape")),
                 1 => {
                     let (segments, indices) = (numbers(table, SEGMENTS)?, numbers(table, INDICES)?);
                     let in_order = segments.windows(2).all(|w| w[0] <= w[1]);
@@ -81,7 +81,7 @@ impl<'a> Layout<'a> {
                         || segments.last().is_none_or(|l| *l > indices.len())
                         || indices.iter().any(|i| *i >= size)
                     {
-                        return Err(bad("has indices that lead out of it"));
+                        return Err(bad("has indices out of range"));
                     }
                     Level::Rows { segments, indices }
                 }
@@ -102,7 +102,7 @@ impl<'a> Layout<'a> {
     ) -> Result<(), NetworkError> {
         let Some(kind) = self.levels.get(level) else {
             let place = at.iter().zip(self.shape).fold(0, |place, (i, n)| place * n + i);
-            let (first, rest) = values.split_first().ok_or_else(|| bad("has fewer values than places"))?;
+            let (first, rest) = values.split_first().ok_or_else(|| bad("has too few values"))?;
             out[place] = *first;
             *values = rest;
             return Ok(());
@@ -118,7 +118,7 @@ impl<'a> Layout<'a> {
             Level::Dense(n) => (0..*n).try_for_each(|i| enter(i, row * n + i)),
             Level::Rows { segments, indices } => {
                 let ends = segments.get(row).zip(segments.get(row + 1));
-                let (start, end) = ends.ok_or_else(|| bad("has fewer rows than places"))?;
+                let (start, end) = ends.ok_or_else(|| bad("has too few rows"))?;
                 (*start..*end).try_for_each(|k| enter(indices[k], k))
             }
         }
@@ -127,7 +127,7 @@ impl<'a> Layout<'a> {
 
 /// Indices as numbers of 32, 16 or 8 bits.
 fn numbers(table: &Table, field: usize) -> Result<Vec<usize>, NetworkError> {
-    let vector = table.table(field + 1)?.ok_or_else(|| bad("lacks indices"))?;
+    let vector = table.table(field + 1)?.ok_or_else(|| bad("has missing indices"))?;
     match table.u8(field)? {
         1 => vector.indices(0),
         2 => Ok(vector.u16s(0)?.into_iter().map(usize::from).collect()),

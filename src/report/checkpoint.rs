@@ -17,16 +17,19 @@ const HASH: usize = 16;
 #[derive(Debug, thiserror::Error)]
 pub enum CheckpointError {
     /// It begins with something else.
-    #[error("this is no checkpoint of a chain, or one in another format")]
+    #[error("this is not a chain checkpoint, or has another format")]
     Format,
     /// Its contents have changed since it was written.
     #[error("the checkpoint is damaged")]
     Damaged,
     /// It was written by another version.
-    #[error("the checkpoint was written by pcadlang {0}; this is {VERSION}, whose chains may differ")]
+    #[error(
+        "the checkpoint was written by pcadlang {0}; chains may differ under this version, \
+             {VERSION}"
+    )]
     Version(String),
     /// It belongs to another program, data or settings.
-    #[error("the checkpoint belongs to another run: the program, its data or its settings were others")]
+    #[error("the checkpoint belongs to another run: the program, its data or its settings differ")]
     Run,
     /// It does not fit together.
     #[error("the checkpoint cannot be read: {0}")]
@@ -101,7 +104,10 @@ mod tests {
         let other = SavedChain { version: "0.0.1".into(), ..saved }.to_bytes();
         assert_eq!(
             error(&other, "a").to_string(),
-            format!("the checkpoint was written by pcadlang 0.0.1; this is {VERSION}, whose chains may differ")
+            format!(
+                "the checkpoint was written by pcadlang 0.0.1; chains may differ under this \
+                     version, {VERSION}"
+            )
         );
     }
 }

@@ -30,7 +30,7 @@ impl Quantity {
     /// let model = pcadlang::Model::from_text("assume x ~ normal(0, 1); infer { repeat 100 { collect x; } }")?;
     /// let posterior = model.run(&pcadlang::RunOptions::default(), 2, 1)?;
     /// let why = posterior.quantity("x").and_then(|q| q.why_no_r_hat());
-    /// assert_eq!(why, Some("it never moved in any chain, and the chains are at different values"));
+    /// assert_eq!(why, Some("it never moved in any chain, and the chains have different values"));
     /// # Ok::<(), pcadlang::Error>(())
     /// ```
     pub fn why_no_r_hat(&self) -> Option<&'static str> {
@@ -40,10 +40,13 @@ impl Quantity {
         let draws = || self.chains.iter().flatten();
         Some(match () {
             () if self.chains.len() < 2 => "a single chain",
-            () if self.chains.iter().any(|c| c.len() < 4) => "fewer than 4 draws a chain",
-            () if draws().any(|x| x.is_nan()) => "it is not there in every draw",
+            () if self.chains.iter().any(|c| c.len() < 4) => "fewer than 4 draws per chain",
+            () if draws().any(|x| x.is_nan()) => "it is missing from some draws",
             () if !draws().all(|x| x.is_finite()) => "it is infinite in some draws",
-            () if self.is_stuck() => "it never moved in any chain, and the chains are at different values",
+            () if self.is_stuck() => {
+                "it never moved in any chain, and the chains have different \
+                                      values"
+            }
             () => "it never moved",
         })
     }

@@ -131,17 +131,23 @@ pub(super) fn warning(modes: &[Mode]) -> Option<String> {
         return None;
     }
     let what = match each {
-        true => format!("each of the {chains} chains is in a mode of its own"),
+        true => format!("the {chains} chains are each in a different mode"),
         false => format!("the {chains} chains are in {n} different modes"),
     };
     let probable = match (modes[0].probability.map(number), modes[0].by_evidence) {
-        (Some(p), true) => format!("by its estimated evidence the first has a probability of {p}"),
-        (Some(p), false) => format!("the first has a probability of {p} by its density, if the modes are equally wide"),
-        (None, _) => "how many chains are in a mode is not its probability".into(),
+        (Some(p), true) => format!(
+            "the first has estimated probability {p}, from the evidence of \
+                                    the modes"
+        ),
+        (Some(p), false) => format!(
+            "the first has probability {p} judged by log density alone, \
+                                     that is, if all modes are equally wide"
+        ),
+        (None, _) => "the fraction of chains in a mode does not estimate its probability".into(),
     };
     Some(format!(
-        "{what}, so means over all of them say little: look at each mode; a longer warmup, `temper` or `knn` may join them \
-         ({probable})"
+        "{what} and do not mix, so means over all chains are not meaningful: look at each mode; a \
+         longer warm-up, `temper` or `knn` may let chains move between modes ({probable})"
     ))
 }
 

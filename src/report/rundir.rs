@@ -34,13 +34,13 @@ const WRITTEN: [&str; 15] = [
 #[derive(Debug, thiserror::Error)]
 pub enum RunDirError {
     /// It holds something else.
-    #[error("{0} is not empty and no folder of a run; choose another with --out")]
+    #[error("{0} is not empty and is not the folder of a run; choose another with --out")]
     Occupied(PathBuf),
     /// It holds something, and no evaluation.
-    #[error("{0} is not empty and no folder of an evaluation; choose another with --out")]
+    #[error("{0} is not empty and is not the folder of an evaluation; choose another with --out")]
     NoEvaluation(PathBuf),
     /// It holds no run.
-    #[error("{0} holds no run")]
+    #[error("{0} is not the folder of a run")]
     NoRun(PathBuf),
     /// It cannot be made or written.
     #[error("{path}: {error}")]

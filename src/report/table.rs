@@ -84,7 +84,8 @@ pub fn sites(sites: &[SiteStats]) -> String {
     let mut worst: Vec<&SiteStats> = sites.iter().collect();
     let rate = |s: &SiteStats| s.acceptance().unwrap_or(f64::INFINITY);
     worst.sort_by(|a, b| rate(a).total_cmp(&rate(b)));
-    let mut rows = vec![["one at a time, least moved first", "proposals", "accepted"].map(str::to_owned).to_vec()];
+    let mut rows =
+        vec![["single-site moves, least accepted first", "proposals", "accepted"].map(str::to_owned).to_vec()];
     for s in worst.iter().take(SHOWN) {
         let rate = s.acceptance().map_or("-".into(), |r| format!("{:.0}%", 100.0 * r));
         rows.push(vec![s.address.clone(), s.proposals.to_string(), rate]);

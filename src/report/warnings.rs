@@ -17,42 +17,47 @@ pub fn warnings(quantities: &[Quantity], modes: &[Mode], kernels: &[KernelStats]
     let mut out = Vec::new();
     if let Some(q) = quantities.iter().find(|q| q.is_stuck() && q.chains.iter().all(|c| c.len() >= STUCK)) {
         out.push(format!(
-            "the chains disagree: {} never moved in any chain, and the chains are at different values; give it a kernel \
-             that reaches it, or smaller steps",
+            "the chains disagree: {} never moved in any chain, and the chains have different \
+             values; use a kernel that updates it, or smaller steps",
             q.name
         ));
     }
     if let Some((r, name)) = worst(quantities, |q| q.summary.r_hat).filter(|(r, _)| *r > 1.01) {
         let what = if r > DISAGREE { "the chains disagree" } else { "the chains may not have mixed" };
         let r = if r > 100.0 { "above 100".to_owned() } else { format!("{r:.2}") };
-        out.push(format!("{what}: R-hat of {name} is {r} (1.01 or less is wanted); run longer with --time or --steps"));
+        out.push(format!(
+            "{what}: R-hat of {name} is {r} (it should be at most 1.01); run longer \
+                          with --time or --steps"
+        ));
     }
     out.extend(modes::warning(modes));
     let wanted = 100 * chains;
     if let Some((e, name)) = worst(quantities, |q| -q.summary.ess_bulk).filter(|(e, _)| -e < wanted as f64) {
         let e = -e;
         out.push(format!(
-            "few independent draws: {e:.0} of {name} ({wanted} are wanted); run longer with --time or --steps"
+            "low effective sample size: {e:.0} for {name} (at least {wanted} recommended); run \
+             longer with --time or --steps"
         ));
     }
     if quantities.first().is_some_and(|q| q.chains.iter().map(Vec::len).sum::<usize>() > 0 && too_short(q)) {
-        out.push("too few draws to judge the chains: at least 4 a chain are needed; run longer".into());
+        out.push("too few draws to assess convergence: at least 4 per chain are needed; run longer".into());
     }
     for k in kernels.iter().filter(|k| k.proposals >= JUDGED) {
         if 2 * k.failed > k.proposals {
             out.push(format!(
-                "{}: {} of {} proposals led where the program has no value (a scale that is not positive, say); \
-                 narrow the prior, or take smaller steps",
+                "{}: {} of {} proposals had no log density (for example, a scale that is not \
+                 positive); use a narrower prior, or smaller steps",
                 k.name, k.failed, k.proposals
             ));
         } else if k.divergent > 0 {
             out.push(format!(
-                "{}: {} of {} trajectories were divergent, so some of the posterior may not have been explored; a \
-                 non-centred form (normal(0, 1) times a scale) is the usual remedy, or add `drift` to the mix",
+                "{}: {} of {} trajectories diverged, so parts of the posterior may be unexplored; \
+                 the usual remedy is a non-centred parameterisation (normal(0, 1) times a scale); \
+                 a longer warm-up, or adding `drift` to the mix, may also help",
                 k.name, k.divergent, k.proposals
             ));
         } else if k.accepted == 0 {
-            out.push(format!("{} accepted none of {} proposals; it only costs time", k.name, k.proposals));
+            out.push(format!("{} accepted none of {} proposals, so it only costs time", k.name, k.proposals));
         }
     }
     out
@@ -103,8 +108,11 @@ mod tests {
             warnings(&all, &modes(&all, None), &[], 2)
         };
         assert!(w[0].starts_with("the chains disagree: R-hat of far is"), "{w:?}");
-        assert!(w[1].starts_with("each of the 2 chains is in a mode of its own"), "{w:?}");
-        assert!(w[2].starts_with("few independent draws: ") && w[2].contains("of far (200 are wanted)"), "{w:?}");
+        assert!(w[1].starts_with("the 2 chains are each in a different mode"), "{w:?}");
+        assert!(
+            w[2].starts_with("low effective sample size: ") && w[2].contains("for far (at least 200 recommended)"),
+            "{w:?}"
+        );
     }
 
     #[test]

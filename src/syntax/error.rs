@@ -134,7 +134,7 @@ impl IntoDiagnostic for SyntaxError {
             UnknownCharacter(c) => unknown_character(c, span),
             Foreign(foreign, found) => foreign_spelling(foreign, &found, span),
             UnterminatedString => error("this string is not closed", "no closing `\"` on this line")
-                .hint("a string ends on the line it begins on; a line break in it is written `\\n`"),
+                .hint("a string cannot span lines; write a line break in it as `\\n`"),
             UnterminatedComment => error("this comment is not closed", "begins here").hint("`/*` needs a `*/`"),
             UnknownEscape => error("unknown escape in a string", "").hint(
                 "the escapes are `\\n`, `\\t`, `\\r`, `\\\"`, `\\\\` and `\\u{1f600}`; a backslash is written `\\\\`",
@@ -145,23 +145,25 @@ impl IntoDiagnostic for SyntaxError {
                 "`$rot` selects the choices tagged `#rot`, `$bone:arm_l` those tagged `#bone` with the value `arm_l`",
             ),
             Unclosed { open, before } => unclosed(open, before, span),
-            StrayClose(close) => error(&format!("unexpected `{close}`"), "nothing is open here that it could close"),
-            TooNested => error("too many brackets inside each other", "one more than is accepted")
+            StrayClose(close) => error(&format!("unexpected `{close}`"), "no open bracket to close"),
+            TooNested => error("brackets are nested too deeply", "one too many")
                 .note(format!("at most {MAX_NESTING} brackets may be open at a time")),
-            TooDeep => error("this is nested too deeply", "inside here")
+            TooDeep => error("this is nested too deeply", "in here")
                 .hint("break it up with `let`; for a long sum or product, put the terms into an array")
-                .note(format!("at most {MAX_DEPTH} operators, calls and blocks may stand inside each other")),
+                .note(format!("at most {MAX_DEPTH} operators, calls and blocks may be nested")),
             TooManyTokens => error("the program is too long", "")
-                .hint("put data into a file of its own: `data d = csv(\"points.csv\");`")
+                .hint("put data into a separate file: `data d = csv(\"points.csv\");`")
                 .note(format!("at most {MAX_TOKENS} words, numbers and symbols are accepted in a file")),
             TooLarge(bytes) => too_large(bytes, span),
             MissingSemicolon { .. } => error("expected `;` at the end of this statement", "add `;` here"),
             Unexpected { found, expected, advice, .. } => unexpected(&found, &expected, advice, span),
             ValueWithoutElse => error("this value is lost when the condition is false", "the `if` has no `else`")
                 .hint("add `else { … }`, or end the expression with `;`"),
-            DrawTarget => error("only a name can be drawn", "this is no name")
-                .hint("write `x ~ d;` or, with a key, `x[k] ~ d;`; what is known is observed: `observe d = v;`"),
-            TooManyErrors => error("too many errors", "from here on they are not shown"),
+            DrawTarget => error("expected a name before `~`", "this is not a name").hint(
+                "write `x ~ d;` or, with a key, `x[k] ~ d;`; to observe a known value: \
+                       `observe d = v;`",
+            ),
+            TooManyErrors => error("too many errors", "further errors are not shown"),
         }
     }
 }
@@ -175,15 +177,18 @@ fn unknown_character(c: char, span: Span) -> Diagnostic {
     let hint = match c {
         '\0' => Some("is this a text file?"),
         '\u{a0}' | '\u{202f}' | '\u{3000}' | '\u{2000}'..='\u{200a}' => {
-            Some("it looks like a space, but is not; type one")
+            Some("this character looks like a space but is not; replace it with a space")
         }
-        '\u{200b}'..='\u{200f}' | '\u{2028}'..='\u{202e}' | '\u{feff}' => Some("it is invisible; delete it"),
-        '−' | '–' | '—' => Some("a minus is written `-`"),
-        '×' | '·' | '∗' => Some("times is written `*`"),
-        '÷' => Some("divided by is written `/`"),
-        '≤' => Some("at most is written `<=`"),
-        '≥' => Some("at least is written `>=`"),
-        '≠' => Some("different is written `!=`"),
+        '\u{200b}'..='\u{200f}' | '\u{2028}'..='\u{202e}' | '\u{feff}' => Some(
+            "it is an \
+            invisible character; delete it",
+        ),
+        '−' | '–' | '—' => Some("write minus as `-`"),
+        '×' | '·' | '∗' => Some("write times as `*`"),
+        '÷' => Some("write division as `/`"),
+        '≤' => Some("write \"at most\" as `<=`"),
+        '≥' => Some("write \"at least\" as `>=`"),
+        '≠' => Some("write \"not equal\" as `!=`"),
         '…' => Some("a range is written `a .. b`"),
         '∼' | '～' => Some("a random choice is written with `~`"),
         '→' | '←' | '⇒' => Some("an arm of `mix` is written with `=>`; a choice with `~`, a value with `=`"),
@@ -197,7 +202,10 @@ fn unknown_character(c: char, span: Span) -> Diagnostic {
         '，' => Some("a comma is written `,`"),
         '（' | '）' => Some("parentheses are written `(` and `)`"),
         '?' => Some("a choice between two values is written `if c { a } else { b }`"),
-        '\\' => Some("a function is written `fn(x) { … }`; a statement may go on on the next line as it is"),
+        '\\' => Some(
+            "a function is written `fn(x) { … }`; a statement may continue on the next \
+                      line",
+        ),
         _ => None,
     };
     let diagnostic = Diagnostic::error(format!("unknown character {shown}"), span, "");
@@ -213,9 +221,10 @@ fn foreign_spelling(foreign: Foreign, found: &str, span: Span) -> Diagnostic {
         Foreign::LeftArrow => error("").hint(
             "`x ~ d;` makes a random choice, `let x = e;` binds a value; less than minus three is written `x < -3`",
         ),
-        Foreign::RightArrow => {
-            error("").hint("functions declare no result type: `fn f(x) { … }`; an arm of `mix` is written with `=>`")
-        }
+        Foreign::RightArrow => error("").hint(
+            "functions have no result type: `fn f(x) { … }`; an arm of `mix` is \
+                            written with `=>`",
+        ),
         Foreign::ColonEq => error("").hint("a value is bound by `let x = e;`, a random choice by `x ~ d;`"),
         Foreign::EqEqEq => error("write `==`"),
         Foreign::NotEqEq => error("write `!=`"),
@@ -224,9 +233,13 @@ fn foreign_spelling(foreign: Foreign, found: &str, span: Span) -> Diagnostic {
             error("").hint("write `or` between conditions, `fn(x) { … }` for a function, `f(x)` for its call")
         }
         Foreign::Update => error("").hint(
-            "values do not change; bind a new name, `let y = x + 1;`, or add to the log density, `factor(logw);`",
+            "values cannot be changed; bind a new name, `let y = x + 1;`, or add to the log \
+             density, `factor(logw);`",
         ),
-        Foreign::Increment => error("").hint("values do not change; bind a new name: `let y = x + 1;`"),
+        Foreign::Increment => error("").hint(
+            "values cannot be changed; bind a new name: `let y = \
+            x + 1;`",
+        ),
         Foreign::ColonColon => error("write `.`").hint("a name of an included file is written `scene.render`"),
         Foreign::Quote => Diagnostic::error(format!("strings are not written with {found}"), span, "")
             .hint("use straight double quotes: \"like this\""),
@@ -254,7 +267,7 @@ fn address(problem: AddressError, span: Span) -> Diagnostic {
         AddressError::NoName => Diagnostic::error("an `@` without an address", span, "expected a name right after it")
             .hint("`@x` is the choice named x, `@pose[arm]/bone/rot` one inside a call, `@**` all of them"),
         AddressError::Occurrence => Diagnostic::error("the number after `#` counts from 1", span, "")
-            .hint("`@geom#2` is what the second call of `geom` makes"),
+            .hint("`@geom#2` selects what the second call of `geom` makes"),
         AddressError::Key => {
             Diagnostic::error("this is not a key", span, "expected a word, a number, \"…\", `*` or `{`")
                 .hint("a key that is computed is written in braces: `@x[{i + 1}]`")

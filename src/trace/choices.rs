@@ -336,8 +336,8 @@ impl Graph {
         for (old, new) in std::mem::take(&mut self.choices.suspects) {
             let alive = |n: NodeId| self.nodes[n as usize].state != State::Empty;
             if alive(old) && alive(new) {
-                let message = format!("a second choice is drawn at {}", self.address(code, new));
-                let hint = Some("give each draw a name or key of its own".to_owned());
+                let message = format!("a second choice at the address {}", self.address(code, new));
+                let hint = Some("give each choice its own name or key".to_owned());
                 return Err(self.fail(code, new, FaultKind::Duplicate, message, hint));
             }
         }

@@ -174,8 +174,8 @@ impl Graph {
     pub fn need(&mut self, code: &Code, n: NodeId) -> Result<Step, Failure> {
         if self.nodes[n as usize].state == State::Running {
             let message = match self.name_of(code, n) {
-                Some(name) => format!("`{name}` needs its own value"),
-                None => "this value needs itself".to_owned(),
+                Some(name) => format!("`{name}` depends on its own value"),
+                None => "this value depends on itself".to_owned(),
             };
             return Err(self.fail(code, n, FaultKind::Cycle, message, None));
         }

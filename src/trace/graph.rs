@@ -185,7 +185,7 @@ impl Graph {
                 frame.owner,
                 FaultKind::Limit,
                 format!("calls are nested more than {} deep", self.limits.depth),
-                Some(format!("does the recursion have a base case that is reached? If so, {}", raise("depth"))),
+                Some(format!("does the recursion reach a base case? If so, {}", raise("depth"))),
             ));
         }
         if self.nodes.len() + len > self.limits.nodes as usize {
@@ -194,7 +194,7 @@ impl Graph {
                 frame.owner,
                 FaultKind::Limit,
                 format!("the trace grew beyond {} nodes", self.limits.nodes),
-                Some(format!("does the program loop or recurse without end? If not, {}", raise("nodes"))),
+                Some(format!("does the program loop or recurse forever? If not, {}", raise("nodes"))),
             ));
         }
         self.count_operation(code, frame.owner)?;

@@ -42,13 +42,13 @@ impl Limits {
     /// # Errors
     /// A name that is none of [`Limits::NAMES`], or a number that is too large for it.
     pub fn with(mut self, name: &str, number: u64) -> Result<Limits, String> {
-        let small = || u32::try_from(number).map_err(|_| format!("{name} is at most {}", u32::MAX));
+        let small = || u32::try_from(number).map_err(|_| format!("{name} may be at most {}", u32::MAX));
         match name {
             "depth" => self.depth = small()?,
             "nodes" => self.nodes = small()?,
             "elements" => self.elements = number,
             "operations" => self.operations = number,
-            _ => return Err(format!("there is no limit `{name}`: there are {}", Limits::NAMES.join(", "))),
+            _ => return Err(format!("there is no limit `{name}`; the limits are {}", Limits::NAMES.join(", "))),
         }
         Ok(self)
     }
@@ -169,7 +169,7 @@ impl Graph {
             return Ok(());
         }
         let message = "stopped in the middle of an evaluation".to_owned();
-        let hint = "one evaluation of the program took longer than was left".to_owned();
+        let hint = "one evaluation of the program took longer than the remaining time".to_owned();
         Err(self.fail(code, n, FaultKind::Stopped, message, Some(hint)))
     }
 
@@ -192,7 +192,7 @@ impl Graph {
         };
         self.spent.elements += made as u64;
         if self.spent.elements > self.limits.elements {
-            let message = format!("what one evaluation makes has more than {} elements", self.limits.elements);
+            let message = format!("the values made by one evaluation have more than {} elements", self.limits.elements);
             return Err(self.fail(code, n, FaultKind::Limit, message, Some(raise("elements"))));
         }
         Ok(())
@@ -203,10 +203,10 @@ impl Graph {
             Extent::Fits => return Ok(()),
             Extent::TooDeep => (
                 format!("arrays and records are nested more than {MOST_NESTED} deep"),
-                "keep what grows in one array: append(xs, x)",
+                "collect growing values in one array: append(xs, x)",
             ),
             Extent::TooLarge => (
-                format!("a value of more than {MOST_ELEMENTS} elements, those of its elements counted"),
+                format!("a value with more than {MOST_ELEMENTS} elements, counting nested ones"),
                 "an array that is used several times counts each time",
             ),
         };

@@ -184,7 +184,7 @@ impl Trace {
                 Given::Stored(d) => Some(d.clone()),
             };
             if datum.as_ref().is_some_and(has_nan) {
-                return Err(wrong(format!("what is given to `{address}` is not a number")));
+                return Err(wrong(format!("the value given for `{address}` is not a number")));
             }
             if target.is_none()
                 && let Some(old) = self.observed_at(address, &nodes)
@@ -265,7 +265,7 @@ impl Trace {
         let text = address.to_string();
         let near = crate::diag::nearest(&text, known.iter().map(String::as_str));
         let near = near.map(|n| format!("; did you mean `{n}`?")).unwrap_or_default();
-        wrong(format!("there is no choice or observation `{text}` in the trace{near}"))
+        wrong(format!("the trace has no choice or observation `{text}`{near}"))
     }
 
     /// The value of another form than its choice has now, if there is one, that made the program fail.

@@ -132,7 +132,7 @@ pub enum SaveError {
     #[error("the trace belongs to another program, or to another version of this one")]
     Program,
     /// A choice of the file does not occur in the program.
-    #[error("the trace has a choice {0} which the program does not make")]
+    #[error("the trace has a choice {0} that the program does not make")]
     Unknown(String),
     /// The program fails with these choices.
     #[error("{0}")]

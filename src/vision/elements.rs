@@ -121,7 +121,7 @@ impl Step<'_> {
 #[derive(Debug, Clone, PartialEq, Eq, Error)]
 pub enum ComparatorError {
     /// The frame has no pixels or too many.
-    #[error("a comparison at {width}x{height} pixels is not possible: each side must be 1 to 16384 pixels")]
+    #[error("cannot compare at {width} x {height} pixels: each side must be 1 to 16384 pixels")]
     Size {
         /// Width asked for, in pixels.
         width: u32,
@@ -137,10 +137,13 @@ pub enum ComparatorError {
         range: &'static str,
     },
     /// The observed map's lists have different lengths.
-    #[error("the observed contours are damaged: their lists differ in length")]
+    #[error("the observed contours are invalid: their lists differ in length")]
     Map,
     /// A quantised picture whose labels do not fit it.
-    #[error("a picture in few colours needs one label a pixel, each below the number of colours, 1 to 256")]
+    #[error(
+        "a colour-reduced picture needs one label per pixel, each below the number of \
+             colours, 1 to 256"
+    )]
     Labels,
 }
 

@@ -15,28 +15,31 @@ pub enum VisionError {
         source: Box<VisionError>,
     },
     /// The file is not there.
-    #[error("there is no such file")]
+    #[error("no such file")]
     Missing,
     /// The file could not be read.
-    #[error("the file cannot be read: {0}")]
+    #[error("cannot read the file: {0}")]
     Io(#[from] std::io::Error),
     /// There are no bytes.
     #[error("the file is empty")]
     Empty,
     /// The bytes are not those of a PNG or JPEG picture.
-    #[error("not a picture: the file does not begin as PNG or JPEG files do{0}")]
+    #[error("not a picture: the file does not start like a PNG or JPEG file{0}")]
     NotAnImage(&'static str),
     /// The build cannot decode pictures.
-    #[error("this build reads no PNG or JPEG: it was made without the feature `codecs`")]
+    #[error("this build cannot read PNG or JPEG: it was made without the feature `codecs`")]
     NoCodecs,
     /// The picture ends early.
-    #[error("the picture is cut short: the file ends before all of its pixels")]
+    #[error("the picture is truncated: the file ends before the last pixel")]
     Truncated,
     /// The picture cannot be decoded.
-    #[error("the picture is damaged or of a kind that is not supported: {0}")]
+    #[error("the picture is damaged or its format is not supported: {0}")]
     Damaged(String),
     /// The picture is larger than allowed.
-    #[error("the picture is too large: {width} x {height} pixels; at most {max_side} a side and {max_pixels} in all")]
+    #[error(
+        "the picture is too large: {width} x {height} pixels; at most {max_side} per side and \
+             {max_pixels} in total"
+    )]
     TooLarge {
         /// Width, pixels.
         width: u32,

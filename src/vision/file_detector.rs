@@ -126,8 +126,8 @@ fn network(bytes: &[u8], options: &NetworkOptions) -> Result<FileDetector, Visio
 #[cfg(not(feature = "onnx"))]
 fn network(_: &[u8], _: &NetworkOptions) -> Result<FileDetector, VisionError> {
     Err(VisionError::Detector(
-        "this build runs no networks (ONNX): it was made without the feature `onnx`; build it with \
-         `cargo install --path . --features onnx`"
+        "this build cannot run networks (ONNX): it was made without the feature `onnx`; build it \
+         with `cargo install --path . --features onnx`"
             .into(),
     ))
 }

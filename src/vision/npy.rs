@@ -43,7 +43,7 @@ impl NpyArray {
             [h, w] | [h, w, 1] if h > 0 && w > 0 => {
                 u32::try_from(w).ok().zip(u32::try_from(h).ok()).ok_or_else(|| bad("it is too large"))
             }
-            _ => Err(bad(format!("its shape is {:?}; a picture has two axes, height and width", self.shape))),
+            _ => Err(bad(format!("its shape is {:?}; it must have two axes, height and width", self.shape))),
         }
     }
 }
@@ -69,11 +69,11 @@ pub fn parse(bytes: &[u8]) -> Result<NpyArray, VisionError> {
     }
     if !is_npy(bytes) {
         return Err(bad(match bytes {
-            [b'P', b'K', 3, 4, ..] => "it is a .npz archive; save the one array with numpy.save",
-            _ => "it does not begin as .npy files do",
+            [b'P', b'K', 3, 4, ..] => "it is a .npz archive; save the array with numpy.save",
+            _ => "it does not start like a .npy file",
         }));
     }
-    let cut = || bad("it is cut short");
+    let cut = || bad("it is truncated");
     let byte = |i: usize| bytes.get(i).map(|&b| usize::from(b)).ok_or_else(cut);
     let (start, length) = match byte(6)? {
         1 => (10, byte(8)? | byte(9)? << 8),
@@ -83,8 +83,10 @@ pub fn parse(bytes: &[u8]) -> Result<NpyArray, VisionError> {
     let end = start + length;
     let header =
         std::str::from_utf8(bytes.get(start..end).ok_or_else(cut)?).map_err(|_| bad("its header is not text"))?;
-    let descr =
-        quoted(field(header, "descr")?).ok_or_else(|| bad("its elements are records; only plain numbers are read"))?;
+    let descr = quoted(field(header, "descr")?).ok_or_else(|| {
+        bad("its elements are records; only plain \
+            numbers are supported")
+    })?;
     if !field(header, "fortran_order")?.starts_with("False") {
         return Err(bad("it is in Fortran order; save numpy.ascontiguousarray(a)"));
     }
@@ -94,7 +96,7 @@ pub fn parse(bytes: &[u8]) -> Result<NpyArray, VisionError> {
     let take = |size: usize| -> Result<&[u8], VisionError> {
         let need = count.checked_mul(size).ok_or_else(|| bad("its shape is too large"))?;
         if body.len() > need {
-            return Err(bad(format!("it has {} bytes of numbers, its shape says {need}", body.len())));
+            return Err(bad(format!("it has {} bytes of numbers, but its shape needs {need}", body.len())));
         }
         body.get(..need).ok_or_else(cut)
     };
@@ -105,7 +107,8 @@ pub fn parse(bytes: &[u8]) -> Result<NpyArray, VisionError> {
         "|b1" | "<b1" | "?" => NpyData::Bool(take(1)?.iter().map(|&b| b != 0).collect()),
         other => {
             return Err(bad(format!(
-                "its elements are '{other}'; float32, float64, uint8 and bool (little-endian) are read"
+                "its elements are '{other}'; float32, float64, uint8 and bool (little-endian) are \
+                 supported"
             )));
         }
     };
@@ -128,7 +131,7 @@ fn quoted(text: &str) -> Option<&str> {
 }
 
 fn shape(text: &str) -> Result<Vec<usize>, VisionError> {
-    let wrong = || bad("its header has no readable shape");
+    let wrong = || bad("its header has no valid shape");
     let inside = text.strip_prefix('(').and_then(|t| t.split_once(')')).ok_or_else(wrong)?.0;
     inside
         .split(',')
@@ -204,9 +207,9 @@ mod tests {
         for n in 0..good.len() {
             assert!(parse(&good[..n]).is_err(), "{n}");
         }
-        assert!(message(&good[..good.len() - 1]).contains("cut short"));
+        assert!(message(&good[..good.len() - 1]).contains("truncated"));
         assert!(message(&[&good[..], &[0]].concat()).contains("9 bytes"));
-        assert!(message(b"hello, world").contains("does not begin"));
+        assert!(message(b"hello, world").contains("does not start"));
         assert!(message(b"PK\x03\x04....").contains(".npz"));
         assert!(message(&bytes_of(1, ">f4", "False", "(2,)", &[0; 8])).contains(">f4"));
         assert!(message(&bytes_of(1, "<f4", "True", "(2,)", &[0; 8])).contains("Fortran"));

@@ -302,13 +302,13 @@ pub const PROOFS: &[Proof] = &[
     },
     Proof {
         name: "random programs",
-        shows: "from exact draws to exact draws, in random programs whose posteriors are enumerated",
+        shows: "exact draws remain exact draws, in random programs with enumerated posteriors",
         file: "tests/enumeration.rs",
         statements: random::ALL,
     },
     Proof {
         name: "by turns",
-        shows: "parameters and data, drawn by turns as choices, keep the moments of their joint prior",
+        shows: "parameters and data, sampled alternately as choices, keep the moments of their joint prior",
         file: "tests/balance.rs",
         statements: &[BY_TURNS],
     },
@@ -320,7 +320,7 @@ pub const PROOFS: &[Proof] = &[
     },
     Proof {
         name: "Geweke",
-        shows: "kernel and fresh data by turns keep the joint distribution",
+        shows: "alternating the kernel with simulating data leaves the joint distribution invariant",
         file: "tests/calibration.rs",
         statements: &[CALIBRATED],
     },

@@ -121,7 +121,7 @@ pub fn check(text: &str, posterior: &Arc<Posterior>, plan: &Plan, passes: u64, s
     match done {
         Ok(_) => count(posterior, &seen),
         Err(ChainError::Run(e)) if e.message.contains("cannot be summed out") => Said::Refused(e.message.clone()),
-        Err(ChainError::Run(e)) if e.message.contains("only the surrogate asks") => Said::Refused(e.message.clone()),
+        Err(ChainError::Run(e)) if e.message.contains("only the surrogate depends") => Said::Refused(e.message.clone()),
         Err(e) => Said::Failed(format!("{e:?}")),
     }
 }

@@ -71,13 +71,13 @@ impl Dataset {
         for case in &dataset.cases {
             if !is_file_name(&case.name) {
                 return Err(plain(format!(
-                    "{}: the case {:?} cannot be the name of a folder",
+                    "{}: the case name {:?} cannot be used as a folder name",
                     path.display(),
                     case.name
                 )));
             }
             if !seen.insert(&case.name) {
-                return Err(plain(format!("{}: the case {} is there twice", path.display(), case.name)));
+                return Err(plain(format!("{}: the case {} occurs twice", path.display(), case.name)));
             }
         }
         Ok(dataset)
@@ -109,7 +109,11 @@ fn people(path: &Path) -> Result<Dataset, Failure> {
     for Person { id, image } in all.people {
         // The picture lies in the dataset.
         if image.is_empty() || Path::new(&image).components().any(|c| !matches!(c, Component::Normal(_))) {
-            return Err(plain(format!("{}: the image of {id}, {image:?}, is no file beside it", file.display())));
+            return Err(plain(format!(
+                "{}: the image of {id}, {image:?}, is not a file in the same \
+                                      folder",
+                file.display()
+            )));
         }
         cases.push(Case { name: id, image: path.join(image), camera: None });
     }
@@ -141,11 +145,11 @@ fn folders(path: &Path) -> Result<Dataset, Failure> {
 
 fn unknown(path: &Path) -> Failure {
     let hint = if IMAGES.iter().any(|i| path.join(i).is_file()) {
-        "this is one case; give the folder it is in, and its name with --only"
+        "this is a single case; give its parent folder, and its name with --only"
     } else {
-        "expected folders with an image.png each, or an annotations.json with people"
+        "expected folders that each contain image.png, or an annotations.json with people"
     };
-    Failure::Plain(format!("{}: no dataset is there", path.display()), Some(hint.into()))
+    Failure::Plain(format!("{}: not a dataset", path.display()), Some(hint.into()))
 }
 
 /// Whether a folder of that name can stand among the files of an evaluation.

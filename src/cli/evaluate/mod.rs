@@ -51,7 +51,7 @@ pub fn evaluate(a: &Evaluate) -> Result<(), Failure> {
     for (n, &i) in chosen.iter().enumerate() {
         let place = format!("{}/{} {}", n + 1, chosen.len(), e.tasks[i].case.name);
         if e.tasks[i].row.as_ref().is_some_and(|r| r.status == "done") {
-            e.say(&format!("{place}: done before"));
+            e.say(&format!("{place}: already done"));
             continue;
         }
         let (row, failure) = e.run(i);
@@ -130,10 +130,10 @@ impl<'a> Evaluation<'a> {
             e.say(&format!("note: {said}"));
         }
         for name in skipped {
-            e.say(&format!("note: {name} has no image and is left out"));
+            e.say(&format!("note: {name} has no image and is skipped"));
         }
         for t in e.tasks.iter().filter(|t| detections.is_some() && t.chosen && t.job.observe.len() < 2) {
-            e.say(&format!("note: nobody was detected in {}: it runs on its picture alone", t.case.name));
+            e.say(&format!("note: no keypoints for {}: it runs on its picture alone", t.case.name));
         }
         Ok(e)
     }
@@ -154,8 +154,8 @@ impl<'a> Evaluation<'a> {
         }
         match other {
             Some((folder, differences)) if !self.a.fresh => Err(Failure::Plain(
-                format!("{} was run with other settings: {}", folder.display(), differences.join(", ")),
-                Some("choose another folder with --out, or do all cases anew with --fresh".into()),
+                format!("{} was run with different settings: {}", folder.display(), differences.join(", ")),
+                Some("choose another folder with --out, or redo all cases with --fresh".into()),
             )),
             _ => Ok(()),
         }

@@ -22,7 +22,7 @@ impl Detections {
     pub fn open(path: PathBuf) -> Result<Detections, Failure> {
         match serde_json::from_slice(&files::read(&path)?) {
             Ok(Value::Object(people)) => Ok(Detections { path, people }),
-            Ok(_) => Err(plain(format!("{}: expected an object with an entry for each case", path.display()))),
+            Ok(_) => Err(plain(format!("{}: expected a JSON object with one entry per case", path.display()))),
             Err(e) => Err(plain(format!("{}: {e}", path.display()))),
         }
     }

@@ -64,9 +64,10 @@ pub fn open(a: &Tradeoff, program: &Program) -> Result<Vec<Case>, Failure> {
     }
     match all.is_empty() {
         true => Err(Failure::Plain(
-            format!("{}: no case has a known answer", a.cases.display()),
+            format!("{}: no case has ground truth", a.cases.display()),
             Some(
-                "an answer is CASE/depth.npy or CASE/gt.npz, keypoints in annotations.json, or CASE/reference.json"
+                "ground truth is CASE/depth.npy or CASE/gt.npz, keypoints in annotations.json, or \
+                 CASE/reference.json"
                     .into(),
             ),
         )),

@@ -38,15 +38,16 @@ impl Folder {
         match marked {
             None if std::fs::read_dir(path).map_err(fails)?.next().is_some() => {
                 return Err(plain(format!(
-                    "{} holds something else; choose another folder with --out",
+                    "{} contains other files; choose another folder with --out",
                     path.display()
                 )));
             }
             Some(_) if fresh => whole(&journal, &[])?,
             Some(other) => {
                 if let Some((key, _)) = head.iter().find(|(k, v)| !agrees(k, v, &other[k.as_str()])) {
-                    let hint = "choose another folder with --out, or measure everything anew with --fresh";
-                    let message = format!("{}: {key} is not what it was", path.display());
+                    let hint = "choose another folder with --out, or measure everything again \
+                                with --fresh";
+                    let message = format!("{}: {key} has changed", path.display());
                     return Err(Failure::Plain(message, Some(hint.into())));
                 }
                 let text = std::fs::read_to_string(&journal).unwrap_or_default();

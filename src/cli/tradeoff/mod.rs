@@ -82,7 +82,7 @@ pub fn tradeoff(a: &Tradeoff) -> Result<(), Failure> {
     match (interrupt.asked(), out_of_time) {
         (true, _) => Err(Failure::Interrupted),
         (_, true) => Err(Failure::Plain(
-            "the budget is used up before everything was run; what was is written".into(),
+            "the budget ran out before all runs were made; the results so far are written".into(),
             Some("run the same command with a larger --budget to go on".into()),
         )),
         _ => Ok(()),
@@ -199,7 +199,7 @@ impl<'a> Sitting<'a> {
 
     fn presets(&self, rows: &[Row]) -> Presets {
         let about = format!(
-            "the front of {} settings on {} cases, {} threads a run; chosen by pcadlang tradeoff",
+            "the front of {} settings on {} cases, {} threads per run; chosen by pcadlang tradeoff",
             self.candidates.len(),
             self.cases.len(),
             self.threads,

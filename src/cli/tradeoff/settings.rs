@@ -68,9 +68,9 @@ fn files(a: &Tradeoff) -> Result<Vec<(String, String)>, Failure> {
     match std::fs::read_to_string(&name).ok().or_else(|| load::embedded(&name).map(str::to_owned)) {
         Some(text) => Ok(vec![(name, text)]),
         None => Err(Failure::Plain(
-            format!("{name} is not there, so it is not known which settings to try"),
+            format!("{name} does not exist, so there are no settings to try"),
             Some(
-                r#"write one and name it by --settings: {"cross": {"time": [1, 3]}, "vary": {"chains": [1, 2]}}"#
+                r#"write one and give it with --settings: {"cross": {"time": [1, 3]}, "vary": {"chains": [1, 2]}}"#
                     .into(),
             ),
         )),

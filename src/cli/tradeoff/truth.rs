@@ -23,8 +23,11 @@ impl Truth {
     /// What the error of an answer is, for tables and plots.
     pub fn error_name(&self) -> &'static str {
         match self {
-            Truth::Surface(_) => "depth error over found or true mask (Z-MAE-U, object heights)",
-            Truth::Joints(_) => "share of joints not within 0.2 torso lengths (1 - PCKt@0.2)",
+            Truth::Surface(_) => {
+                "depth error over the union of estimated and true mask (Z-MAE-U, \
+                                  object heights)"
+            }
+            Truth::Joints(_) => "fraction of joints not within 0.2 torso lengths (1 - PCKt@0.2)",
             Truth::Posterior(_) => "distance from the reference posterior (its standard deviations)",
         }
     }
@@ -82,7 +85,7 @@ pub fn surface(folder: &Path, camera: Option<&Path>) -> Result<Option<SurfaceTru
         surface.extent(|depth| pixel(&camera, depth))
     };
     if !(object_height > 0.0 && object_width > 0.0) {
-        return Err(wrong("the true depth shows nothing".into()));
+        return Err(wrong("the true depth map is empty".into()));
     }
     Ok(Some(SurfaceTruth { surface, width: object_width, height: object_height }))
 }
@@ -153,7 +156,7 @@ pub fn reference(text: &[u8]) -> Result<Reference, String> {
     }
     let all: IndexMap<String, Moments> = serde_json::from_slice(text).map_err(|e| e.to_string())?;
     if all.is_empty() {
-        return Err("no quantity is there".into());
+        return Err("it contains no quantities".into());
     }
     if let Some((name, _)) = all.iter().find(|(_, m)| !(m.mean.is_finite() && m.sd > 0.0 && m.sd.is_finite())) {
         return Err(format!("{name}: expected a mean and a positive standard deviation"));

@@ -103,7 +103,7 @@ fn components_must_have_the_same_kind_of_values() {
     );
     assert!(message(&[1.0, 1.0], vec![number.clone(), pair([0.0; 2], 0.0)]).contains("the same kind"));
     assert!(message(&[1.0, 1.0], vec![number.clone(), make("poisson", &[1.0])]).contains("the same kind"));
-    assert!(message(&[1.0], vec![number.clone(), number.clone()]).contains("a number for each component"));
+    assert!(message(&[1.0], vec![number.clone(), number.clone()]).contains("one number per component"));
     assert!(message(&[], vec![]).contains("weights"));
     assert!(message(&[-1.0, 2.0], vec![number.clone(), number.clone()]).starts_with("mixture: weights"));
     assert!(message(&[1.0], vec![make("flat", &[])]).contains("proper"));

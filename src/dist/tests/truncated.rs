@@ -228,11 +228,14 @@ fn bounds_without_sense_are_errors() {
     assert_eq!(message(&gamma, 2.0, 1.0), "truncated: lo must be below hi, got 2 and 1");
     assert!(message(&gamma, 1.0, 1.0).contains("an interval without width has no density"));
     assert!(message(&gamma, f64::NAN, 1.0).contains("must be numbers"));
-    assert!(message(&gamma, -2.0, -1.0).contains("must overlap the numbers that `d` draws, got -2 and -1 of gamma"));
+    assert!(message(&gamma, -2.0, -1.0).contains(
+        "must overlap the support of `d`, got -2 and -1 \
+        of gamma"
+    ));
     assert!(message(&make("poisson", &[2.0]), 1.2, 1.8).contains("must overlap"));
-    assert!(message(&make("geometric", &[1.0]), 1.0, INF).contains("must hold some of the probability"));
-    assert!(message(&make("flat", &[]), 0.0, INF).contains("`flat(lo, hi)` takes the bounds itself"));
-    assert!(message(&make("von_mises", &[0.0, 1.0]), 0.0, 1.0).contains("must not be of angles"));
+    assert!(message(&make("geometric", &[1.0]), 1.0, INF).contains("must contain some of the probability"));
+    assert!(message(&make("flat", &[]), 0.0, INF).contains("give the bounds to `flat(lo, hi)`"));
+    assert!(message(&make("von_mises", &[0.0, 1.0]), 0.0, 1.0).contains("must not be a distribution of angles"));
     assert!(message(&make("dirichlet", &[1.0, 1.0]), 0.0, 1.0).contains("must be a distribution of single numbers"));
     assert!(message(&make("flip", &[0.5]), 0.0, 1.0).contains("must be a distribution of single numbers"));
     assert!(message(&truncated(&gamma, 0.0, 1.0).unwrap(), 0.0, 0.5).contains("must not be truncated already"));
@@ -248,8 +251,8 @@ fn flat_priors_on_half_lines() {
     let mut rng = stream(701);
     assert!((0..1000).all(|_| (0.13..7.4).contains(&positive.sample(&mut rng).num().unwrap())));
     let message = |p: &[f64]| try_make("flat", p).unwrap_err().to_string();
-    assert!(message(&[0.0, 1.0]).contains("between two bounds it is uniform(lo, hi)"));
-    assert!(message(&[INF, INF]).contains("must leave numbers") && message(&[f64::NAN, 1.0]).contains("be numbers"));
+    assert!(message(&[0.0, 1.0]).contains("between two finite bounds use uniform(lo, hi)"));
+    assert!(message(&[INF, INF]).contains("must have numbers") && message(&[f64::NAN, 1.0]).contains("be numbers"));
 }
 
 #[test]

@@ -116,7 +116,7 @@ impl Armature {
         Mesh::new(positions.clone(), triangles.clone(), vec![0; triangles.len()])?;
         if influences.len() != positions.len() {
             return Err(GeomError::invalid(format!(
-                "the mesh has {} vertices, but there are skin weights for {}",
+                "the mesh has {} vertices, but skin weights are given for {}",
                 positions.len(),
                 influences.len()
             )));
@@ -167,7 +167,7 @@ impl Armature {
         }
         let skin = match Arc::try_unwrap(self.skin) {
             Ok(skin) => Skin { morphs, ..skin },
-            Err(_) => return Err(GeomError::invalid("this body has its morphs already")),
+            Err(_) => return Err(GeomError::invalid("this body already has morphs")),
         };
         Ok(Armature { skin: Arc::new(skin), ..self })
     }
@@ -275,7 +275,7 @@ impl Armature {
         let transforms = self.rig.transforms(pose, rules)?;
         let single: Vec<Affine3A> = transforms.iter().map(DAffine3::as_affine3a).collect();
         if !single.iter().all(|t| t.is_finite()) {
-            return Err(GeomError::domain("the pose takes the body too far away"));
+            return Err(GeomError::domain("the pose moves the body too far away"));
         }
         let body = Arc::clone(self);
         let solid = Solid::of_parts(move || recent::parts(&body, &single));

@@ -72,7 +72,7 @@ impl Rig {
                 return Err(GeomError::invalid(format!("two joints of the rig are called `{}`", j.name)));
             }
             if !(j.head.is_finite() && j.tail.is_finite()) {
-                return Err(GeomError::invalid(format!("joint `{}` is not at a finite place", j.name)));
+                return Err(GeomError::invalid(format!("the position of joint `{}` is not finite", j.name)));
             }
         }
         let mut parents = Vec::with_capacity(given.len());
@@ -80,7 +80,11 @@ impl Rig {
             parents.push(match &j.parent {
                 None => None,
                 Some(p) => Some(*index.get(p.as_str()).ok_or_else(|| {
-                    GeomError::invalid(format!("joint `{}` has the parent `{p}`, which the rig does not have", j.name))
+                    GeomError::invalid(format!(
+                        "joint `{}` has the parent `{p}`, which is not in \
+                        the rig",
+                        j.name
+                    ))
                 })?),
             });
         }
@@ -117,14 +121,17 @@ impl Rig {
         for (name, joint, rest) in points {
             let Some(j) = self.find(&joint) else {
                 return Err(GeomError::invalid(format!(
-                    "keypoint `{name}` rides on the joint `{joint}`, which the rig does not have"
+                    "keypoint `{name}` is attached to the joint `{joint}`, which is not in the rig"
                 )));
             };
             if self.keypoints.iter().any(|k| *k.name == *name) {
                 return Err(GeomError::invalid(format!("two keypoints of the rig are called `{name}`")));
             }
             if !rest.is_finite() {
-                return Err(GeomError::invalid(format!("keypoint `{name}` is not at a finite place")));
+                return Err(GeomError::invalid(format!(
+                    "the position of keypoint `{name}` is not \
+                    finite"
+                )));
             }
             self.keypoints.push(Keypoint { name: name.into(), joint: j, rest });
         }
@@ -203,12 +210,16 @@ mod tests {
         let e = |joints| Rig::new(joints).unwrap_err().to_string();
         assert_eq!(e(vec![]), "a rig has 1 to 4096 joints, not 0");
         assert_eq!(e(vec![joint("a", None), joint("a", None)]), "two joints of the rig are called `a`");
-        assert_eq!(e(vec![joint("a", Some("x"))]), "joint `a` has the parent `x`, which the rig does not have");
+        assert_eq!(
+            e(vec![joint("a", Some("x"))]),
+            "joint `a` has the parent `x`, which is not in \
+            the rig"
+        );
         let round = vec![joint("r", None), joint("a", Some("c")), joint("b", Some("a")), joint("c", Some("b"))];
         assert_eq!(e(round), "the rig has a cycle: c -> b -> a -> c");
         assert_eq!(e(vec![joint("a", Some("a"))]), "the rig has a cycle: a -> a");
         let rig = Rig::new(vec![joint("a", None)]).unwrap();
         let e = rig.with_keypoints(vec![("nose".into(), "head".into(), DVec3::ZERO)]).unwrap_err().to_string();
-        assert_eq!(e, "keypoint `nose` rides on the joint `head`, which the rig does not have");
+        assert_eq!(e, "keypoint `nose` is attached to the joint `head`, which is not in the rig");
     }
 }

@@ -61,7 +61,12 @@ struct JsonMorph {
 }
 
 fn read<'a, T: Deserialize<'a>>(bytes: &'a [u8], what: &str) -> Result<T, GeomError> {
-    serde_json::from_slice(bytes).map_err(|e| GeomError::invalid(format!("the {what} file cannot be read: {e}")))
+    serde_json::from_slice(bytes).map_err(|e| {
+        GeomError::invalid(format!(
+            "cannot read the {what} \
+        file: {e}"
+        ))
+    })
 }
 
 /// Reads a rig file.
@@ -83,11 +88,17 @@ pub fn rig_from_json(bytes: &[u8]) -> Result<RigFile, GeomError> {
     let influence = |(v, weights): (usize, &Vec<(usize, f32)>)| {
         let mut i = Influence::default();
         if weights.is_empty() {
-            return Err(GeomError::invalid(format!("vertex {v} has no skin weight: nothing would move it")));
+            return Err(GeomError::invalid(format!(
+                "vertex {v} has no skin weight, so no joint \
+                would move it"
+            )));
         }
         if weights.len() > MOST_WEIGHTS {
             let n = weights.len();
-            return Err(GeomError::invalid(format!("vertex {v} has {n} skin weights, at most {MOST_WEIGHTS} can be")));
+            return Err(GeomError::invalid(format!(
+                "vertex {v} has {n} skin weights; at most \
+                {MOST_WEIGHTS} are supported"
+            )));
         }
         // The heaviest first, so that those without weight come last.
         let mut weights = weights.clone();
@@ -165,10 +176,10 @@ mod tests {
     #[test]
     fn what_is_wrong_is_said() {
         let e = |weights: &str| rig(weights, "").unwrap_err().to_string();
-        assert_eq!(e("[[[0, 1]], []]"), "vertex 1 has no skin weight: nothing would move it");
+        assert_eq!(e("[[[0, 1]], []]"), "vertex 1 has no skin weight, so no joint would move it");
         assert_eq!(e("[[[2, 1]]]"), "vertex 0 is moved by joint 2, but the rig has 2 joints");
         assert!(e("[[[0, 0.2], [0, 0.2], [0, 0.2], [0, 0.2], [0, 0.2]]]").starts_with("vertex 0 has 5 skin weights"));
-        assert!(e("7").starts_with("the rig file cannot be read: invalid type: integer `7`"));
+        assert!(e("7").starts_with("cannot read the rig file: invalid type: integer `7`"));
         assert!(rig_from_json(b"{").is_err());
     }
 }

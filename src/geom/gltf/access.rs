@@ -42,9 +42,9 @@ impl<'a> Data<'a> {
     /// The elements of an accessor that must be of this shape (`SCALAR`, `VEC3`, …) and of one of these types.
     pub fn elements(&self, index: usize, shape: &str, components: &[u32]) -> Result<Elements<'_>, GeomError> {
         let wrong = |what: String| GeomError::invalid(format!("accessor {index} of the glTF file {what}"));
-        let a = self.document.accessors.get(index).ok_or_else(|| wrong("is not there".into()))?;
+        let a = self.document.accessors.get(index).ok_or_else(|| wrong("does not exist".into()))?;
         if a.sparse.is_some() {
-            return Err(wrong("is sparse, which cannot be read; export it without".into()));
+            return Err(wrong("is sparse, which is not supported; export without sparse accessors".into()));
         }
         if a.shape != shape {
             return Err(wrong(format!("must be of type {shape}, not {}", a.shape)));
@@ -68,7 +68,13 @@ impl<'a> Data<'a> {
         };
         let view = a.buffer_view.ok_or_else(|| wrong("has no bytes (no bufferView)".into()))?;
         let view = self.document.buffer_views.get(view).ok_or_else(|| wrong(format!("uses a missing view {view}")))?;
-        let buffer = self.buffers.get(view.buffer).ok_or_else(|| wrong("uses a buffer that is not there".into()))?;
+        let buffer = self.buffers.get(view.buffer).ok_or_else(|| {
+            wrong(
+                "uses a buffer that does \
+            not exist"
+                    .into(),
+            )
+        })?;
         let stride = view.byte_stride.filter(|s| *s > 0).unwrap_or(width * size);
         let bytes = || {
             let view = buffer.get(view.byte_offset..view.byte_offset.checked_add(view.byte_length)?)?;
@@ -78,7 +84,7 @@ impl<'a> Data<'a> {
             };
             view.get(a.byte_offset..a.byte_offset.checked_add(length)?)
         };
-        let bytes = bytes().ok_or_else(|| wrong("reaches beyond its buffer".into()))?;
+        let bytes = bytes().ok_or_else(|| wrong("extends beyond its buffer".into()))?;
         let (component, normalized) = (a.component_type, a.normalized);
         Ok(Elements { bytes, stride, component, size, normalized, count: a.count })
     }

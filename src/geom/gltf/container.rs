@@ -39,25 +39,29 @@ pub(super) fn open(bytes: &[u8]) -> Result<(Document, Option<&[u8]>), GeomError>
     let (text, bin) = if bytes.starts_with(b"glTF") { chunks(bytes)? } else { (bytes, None) };
     let text = text.strip_prefix(b"\xef\xbb\xbf").unwrap_or(text);
     let document: Document =
-        serde_json::from_slice(text).map_err(|e| invalid(format!("the glTF file cannot be read: {e}")))?;
+        serde_json::from_slice(text).map_err(|e| invalid(format!("cannot read the glTF file: {e}")))?;
     let version = &document.asset.version;
     if !version.starts_with("2.") {
-        return Err(invalid(format!("glTF of version 2 can be read, not {version}")));
+        return Err(invalid(format!("only glTF version 2 is supported, not {version}")));
     }
     match document.extensions_required.iter().find(|x| !HARMLESS.iter().any(|h| x.starts_with(h))) {
         None => Ok((document, bin)),
-        Some(x) if x.contains("compression") => {
-            Err(invalid(format!("the glTF file is compressed ({x}), which cannot be read; export it without")))
-        }
-        Some(x) => Err(invalid(format!("the glTF file requires the extension {x}, which cannot be read"))),
+        Some(x) if x.contains("compression") => Err(invalid(format!(
+            "the glTF file is compressed ({x}), which is not supported; \
+                                 export without compression"
+        ))),
+        Some(x) => Err(invalid(format!(
+            "the glTF file requires the extension {x}, which is not \
+                                        supported"
+        ))),
     }
 }
 
 fn chunks(bytes: &[u8]) -> Result<(&[u8], Option<&[u8]>), GeomError> {
-    let short = || invalid("the GLB file is cut short");
+    let short = || invalid("the GLB file is truncated");
     let version = word(bytes, 4).ok_or_else(short)?;
     if version != 2 {
-        return Err(invalid(format!("GLB of version 2 can be read, not {version}")));
+        return Err(invalid(format!("only GLB version 2 is supported, not {version}")));
     }
     let bytes = bytes.get(..word(bytes, 8).ok_or_else(short)?).ok_or_else(short)?;
     let chunk = |at: usize| -> Option<(&[u8], &[u8], usize)> {
@@ -83,26 +87,35 @@ pub(super) fn buffers<'a>(
 ) -> Result<Vec<Cow<'a, [u8]>>, GeomError> {
     let count = document.buffers.len();
     if count > MOST_BUFFERS {
-        return Err(invalid(format!("a glTF file of {count} buffers; at most {MOST_BUFFERS}")));
+        return Err(invalid(format!(
+            "the glTF file has {count} buffers; at most {MOST_BUFFERS} are \
+                                    supported"
+        )));
     }
     let mut all = Vec::with_capacity(count);
     for (i, b) in document.buffers.iter().enumerate() {
         let bytes: Cow<[u8]> = match (&b.uri, bin) {
             (None, Some(bin)) if i == 0 => Cow::Borrowed(bin),
-            (None, _) => return Err(invalid(format!("buffer {i} of the glTF file names no file"))),
+            (None, _) => return Err(invalid(format!("buffer {i} of the glTF file has no URI"))),
             (Some(uri), _) => Cow::Owned(match uri.strip_prefix("data:") {
                 Some(rest) => {
                     data(rest).ok_or_else(|| invalid(format!("buffer {i} of the glTF file is not base64")))?
                 }
                 None if uri.contains("://") => {
-                    return Err(invalid(format!("buffer {i} of the glTF file is at {uri}: only files are read")));
+                    return Err(invalid(format!(
+                        "buffer {i} of the glTF file is at {uri}: only \
+                        files are supported"
+                    )));
                 }
                 None => read(&unescaped(uri)).map_err(invalid)?,
             }),
         };
         if bytes.len() < b.byte_length {
             let (has, says) = (bytes.len(), b.byte_length);
-            return Err(invalid(format!("buffer {i} of the glTF file has {has} bytes, not {says} as it says")));
+            return Err(invalid(format!(
+                "buffer {i} of the glTF file has {has} bytes, but declares \
+                                        {says}"
+            )));
         }
         all.push(bytes);
     }

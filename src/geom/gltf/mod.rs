@@ -69,7 +69,10 @@ impl Loaded {
     /// No skin, and as [`Armature::new`]: weights that do not sum to 1.
     pub fn armature(self) -> Result<Armature, GeomError> {
         let Some(rig) = self.rig else {
-            return Err(GeomError::invalid("the glTF file has no skin, so nothing says which joint moves what"));
+            return Err(GeomError::invalid(
+                "the glTF file has no skin, so it does not define which \
+                joint moves which vertices",
+            ));
         };
         let mut known: FxHashMap<Same, u32> = FxHashMap::default();
         let (mut positions, mut influences) = (Vec::new(), Vec::new());

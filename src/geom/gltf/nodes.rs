@@ -49,19 +49,24 @@ impl Nodes {
         match document.scenes.get(document.scene.unwrap_or(0)) {
             Some(scene) => {
                 for i in &scene.nodes {
-                    let missing = || GeomError::invalid(format!("the scene has the node {i}, which is not there"));
+                    let missing = || {
+                        GeomError::invalid(format!(
+                            "the scene refers to the missing \
+                        node {i}"
+                        ))
+                    };
                     *drawn.get_mut(*i).ok_or_else(missing)? = true;
                 }
             }
             None if document.scenes.is_empty() => drawn.fill(true),
-            None => return Err(GeomError::invalid("the glTF file's default scene is not there")),
+            None => return Err(GeomError::invalid("the glTF file's default scene is missing")),
         }
         let mut global = vec![DAffine3::IDENTITY; nodes.len()];
         for i in &order {
             let local = local(&nodes[*i]);
             global[*i] = parents[*i].map_or(local, |p| global[p] * local);
             if !global[*i].is_finite() {
-                return Err(GeomError::invalid(format!("node `{}` is not at a finite place", name(*i))));
+                return Err(GeomError::invalid(format!("the position of node `{}` is not finite", name(*i))));
             }
             drawn[*i] |= parents[*i].is_some_and(|p| drawn[p]);
         }

@@ -22,8 +22,7 @@ pub(super) fn collect(
     let mut out = Loaded { rig, ..Loaded::default() };
     for (i, node) in data.document.nodes.iter().enumerate().filter(|(i, _)| nodes.drawn[*i]) {
         let Some(m) = node.mesh else { continue };
-        let missing =
-            || GeomError::invalid(format!("node `{}` has the mesh {m}, which is not there", name_of(node, i)));
+        let missing = || GeomError::invalid(format!("node `{}` refers to the missing mesh {m}", name_of(node, i)));
         let mesh = data.document.meshes.get(m).ok_or_else(missing)?;
         let called = [&node.name, &mesh.name].into_iter().flatten().find(|s| !s.is_empty());
         let name = called.cloned().unwrap_or_else(|| format!("mesh_{m}"));
@@ -80,7 +79,12 @@ fn add(
     match mode {
         0..=3 => return Ok(None),
         4..=6 => {}
-        _ => return Err(GeomError::invalid(format!("{what} is drawn in mode {mode}, which glTF does not have"))),
+        _ => {
+            return Err(GeomError::invalid(format!(
+                "{what} has mode {mode}, which glTF does not \
+            define"
+            )));
+        }
     }
     let Some(positions) = p.attributes.get("POSITION") else { return Ok(None) };
     let positions = data.elements(*positions, "VEC3", &[F32, I8, U8, I16, U16])?;
@@ -120,7 +124,7 @@ fn add(
         let at = DVec3::from_array(std::array::from_fn(|k| positions.get(v, k)));
         let at = frame.apply(to_scene.transform_point3(at)).as_vec3();
         if !at.is_finite() {
-            return Err(GeomError::invalid(format!("vertex {v} of {what} is not at a finite place")));
+            return Err(GeomError::invalid(format!("vertex {v} of {what} is not finite")));
         }
         out.positions.push(at);
     }

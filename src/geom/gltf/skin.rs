@@ -57,7 +57,10 @@ impl Skeleton {
             let missing = || GeomError::invalid(format!("the glTF file has no skin {s}"));
             let skin = data.document.skins.get(s).ok_or_else(missing)?;
             if let Some(j) = skin.joints.iter().find(|j| **j >= all.len()) {
-                return Err(GeomError::invalid(format!("skin {s} has the node {j} as a joint, which is not there")));
+                return Err(GeomError::invalid(format!(
+                    "skin {s} refers to the missing node {j} as \
+                    a joint"
+                )));
             }
             let Some((first, root)) = skin.joints.iter().copied().enumerate().min_by_key(|(_, j)| rank[*j]) else {
                 return Err(GeomError::invalid(format!("skin {s} of the glTF file has no joints")));
@@ -81,8 +84,7 @@ impl Skeleton {
             }
             let mut joints = Vec::with_capacity(skin.joints.len());
             for (j, bind) in skin.joints.iter().zip(&binds) {
-                let name =
-                    || format!("joint `{}` has an inverse bind matrix that has no inverse", name_of(&all[*j], *j));
+                let name = || format!("the inverse bind matrix of joint `{}` is singular", name_of(&all[*j], *j));
                 let rest = to_scene * inverse(*bind, name)?;
                 joints.push(*number[*j].get_or_insert_with(|| {
                     out.nodes.push(*j);
@@ -182,7 +184,8 @@ pub(super) fn influences(
                 let (joints, weights) = (set.0.count, set.1.count);
                 if joints != vertices || weights != vertices {
                     return Err(GeomError::invalid(format!(
-                        "{what} has {vertices} vertices, but joints for {joints} and weights for {weights}"
+                        "{what} has {vertices} vertices, but JOINTS_0 for {joints} and WEIGHTS_0 \
+                         for {weights}"
                     )));
                 }
                 sets.push(set);

@@ -93,7 +93,7 @@ pub fn geweke(code: &Arc<Code>, sampler: &dyn Sampler, settings: &Settings) -> R
         match taken.failed {
             Some(e) => Err(e),
             None if taken.readings.is_empty() => {
-                Err(CalibrationError::TooFew("a chain has fewer than two draws; give more with --steps".into()))
+                Err(CalibrationError::TooFew("a chain has fewer than two draws; increase --steps".into()))
             }
             None => Ok(taken.readings),
         }

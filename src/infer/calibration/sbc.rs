@@ -129,7 +129,7 @@ impl Watch for Collect {
 fn ranked(truth: &[f64], rows: &[Vec<f64>], settings: &Settings, index: u32) -> Result<Vec<Ranked>, CalibrationError> {
     let kept = RANKS - 1;
     if rows.len() < kept {
-        let message = format!("a chain has {} draws, and {kept} are ranked; give more with --steps", rows.len());
+        let message = format!("a chain has only {} draws, but {kept} are ranked; increase --steps", rows.len());
         return Err(CalibrationError::TooFew(message));
     }
     let one = |(q, truth): (usize, &f64)| {

@@ -52,7 +52,9 @@ fn with_data(mut trace: Trace, settings: &Settings, index: u32) -> Result<Simula
     let refuse = |reason: String| Err(CalibrationError::NotSimulable(reason));
     if !trace.code().freezes.is_empty() {
         return refuse(
-            "`freeze` keeps choices where each chain starts, so that they have no posterior to check".into(),
+            "`freeze` fixes choices at the start of each chain, so their posterior cannot be \
+             checked"
+                .into(),
         );
     }
     let drawn = trace.replicate(replicating(settings.seed, index, 0))?;
@@ -62,18 +64,22 @@ fn with_data(mut trace: Trace, settings: &Settings, index: u32) -> Result<Simula
             n => format!(" (and {} more)", n - 1),
         };
         return refuse(format!(
-            "data cannot be drawn from the program: {address} is {what}, which has no sampler{more}"
+            "data cannot be simulated from the program: {address} is {what}, which has no \
+             sampler{more}"
         ));
     }
     let all = trace.select(&Selector::All);
     let targets = trace.targets(all).to_vec();
     if let Some(t) = targets.iter().find(|t| trace.dist(**t).is_some_and(|d| d.is_improper())) {
         let address = trace.address(*t);
-        return refuse(format!("the prior of {address} is improper: there is nothing to draw true values from"));
+        return refuse(format!(
+            "the prior of {address} is improper, so true values cannot be drawn \
+                               from it"
+        ));
     }
     let given = trace.observed();
     if given.is_empty() {
-        return refuse("the program observes nothing".into());
+        return refuse("the program has no observations".into());
     }
     trace.set_observed(&drawn.values)?;
     trace.commit();
@@ -88,14 +94,18 @@ pub(super) fn same_data(a: &Simulated, b: &Simulated) -> Result<(), CalibrationE
             match y.given.iter().find(|p| p.hash == o.hash) {
                 None => {
                     return refuse(format!(
-                        "the observation {} is there or not as choices have it: a program checked like this observes the same \
-                         things always",
+                        "whether the observation {} exists depends on random choices: this check \
+                         needs a fixed set of observations",
                         o.address
                     ));
                 }
                 // Objects are equal only if they are the same one.
                 Some(p) if !p.value.same(&o.value) && !matches!(p.value, Value::Object(_)) => {
-                    return refuse(format!("what {} observes depends on choices: it is no data", o.address));
+                    return refuse(format!(
+                        "the value observed by {} depends on random choices, so \
+                        it is not data",
+                        o.address
+                    ));
                 }
                 Some(_) => {}
             }

@@ -44,7 +44,7 @@ pub(super) fn step_within(
     span: Span,
 ) -> TraceResult<Outcome> {
     if kernel.sweep(trace).is_some() {
-        return Err(fail(span, "abc takes a kernel of one step, without each(…)".into()));
+        return Err(fail(span, "abc takes a kernel that makes a single step, not each(…)".into()));
     }
     let before = trace.constraints();
     let inner = kernel.step(trace, &At { power: 0.0, ..at.within(0) })?;
@@ -65,7 +65,13 @@ pub(super) fn step_within(
 pub(super) fn simulate(trace: &Trace, draws: Draws, span: Span) -> TraceResult<f64> {
     let replicate = trace.replicate(draws)?;
     if let Some((address, what)) = replicate.silent.first() {
-        return Err(fail(span, format!("abc draws all that is observed, and {address} is {what}")));
+        return Err(fail(
+            span,
+            format!(
+                "abc simulates all observations, but {address} is {what}, \
+                                       which has no sampler"
+            ),
+        ));
     }
     let observed = trace.observed();
     let (mut squares, mut count) = (0.0, 0.0);
@@ -73,7 +79,7 @@ pub(super) fn simulate(trace: &Trace, draws: Draws, span: Span) -> TraceResult<f
         let Some((_, drawn)) = replicate.values.iter().find(|(hash, _)| *hash == o.hash) else { continue };
         let (mut a, mut b) = (Vec::new(), Vec::new());
         if !numbers(&o.value, &mut a) || !numbers(drawn, &mut b) || a.len() != b.len() {
-            return Err(fail(span, format!("abc compares numbers, and {} is {}", o.address, o.value.type_name())));
+            return Err(fail(span, format!("abc compares numbers, but {} is {}", o.address, o.value.type_name())));
         }
         squares += a.iter().zip(&b).map(|(a, b)| (a - b) * (a - b)).sum::<f64>();
         count += a.len() as f64;

@@ -41,13 +41,19 @@ impl Delayed {
         twin.commit();
         if let Some(extra) = trace.lacks(&twin) {
             let address = twin.address(extra);
-            return Err(fail(self.span, format!("delayed: only the surrogate asks for the choice {address}")));
+            return Err(fail(
+                self.span,
+                format!(
+                    "delayed: only the surrogate depends on the choice \
+                {address}"
+                ),
+            ));
         }
         Ok(self.twin.insert(twin))
     }
 
     fn nothing_coarse(&self) -> Box<RunError> {
-        let mut e = fail(self.span, "delayed: no observation there has a coarse surrogate".into());
+        let mut e = fail(self.span, "delayed: no selected observation has a coarse surrogate".into());
         e.hint = Some("observe normal(x, 1) = 2 with coarse = normal(x, 2) as y; … delayed(…, @y)".into());
         e
     }

@@ -96,7 +96,7 @@ impl Own {
                 return Err(self.fault(format!("{address} cannot become {}", m.new.type_name())));
             };
             if has_nan(&new) {
-                return Err(self.fault(format!("what {address} becomes is not a number")));
+                return Err(self.fault(format!("the new value of {address} is not a number")));
             }
             changes.push((*t, Change::Set(new)));
             undo.push((*t, Change::Set(old)));
@@ -140,9 +140,10 @@ impl Own {
     /// What is wrong if the map does not lead back to where it began.
     fn does_not_return(&self, forth: &[Mapped], back: &[Mapped]) -> Option<Box<RunError>> {
         let same = |(f, b): (&Mapped, &Mapped)| f.choice.as_ref().map(|c| c.1) == b.choice.as_ref().map(|c| c.1);
-        let hint = "applied to what it gives, it must give what it was applied to";
+        let hint = "an involution is its own inverse: applied twice, it must return to the \
+                    original values";
         let wrong = if forth.len() != back.len() || !forth.iter().zip(back).all(same) {
-            self.fault("it maps other choices where it leads to".into())
+            self.fault("at the new state it maps different choices".into())
         } else {
             let (f, b) = forth.iter().zip(back).find(|(f, b)| !near(&f.old, &b.new))?;
             let name = f.choice.as_ref().map_or("an auxiliary variable".to_owned(), |(a, _)| a.to_string());
@@ -153,7 +154,7 @@ impl Own {
 
     fn fault(&self, what: String) -> Box<RunError> {
         let name = &self.declared.name;
-        fail(name.span, format!("the map of the kernel `{}` is no involution: {what}", name.node))
+        fail(name.span, format!("the map of the kernel `{}` is not an involution: {what}", name.node))
     }
 
     /// The log of the absolute determinant of the map's Jacobian.
@@ -163,7 +164,7 @@ impl Own {
         };
         let (from, to) = (at_new(map, |m| &m.old), at_new(map, |m| &m.new));
         if from.len() != to.len() {
-            return Err(self.fault("what it gives has another number of coordinates".into()));
+            return Err(self.fault("its result has a different number of coordinates".into()));
         }
         let n = from.len();
         let mut matrix = DMatrix::<f64>::zeros(n, n);
@@ -185,7 +186,7 @@ impl Own {
                 let there = self.play(trace, at, Source::Moved(auxiliaries), Some(&choices))?;
                 let image = at_new(&mapped(&there, trace), |m| &m.new);
                 if image.len() != n || there.drawn.len() != played.drawn.len() {
-                    return Err(self.fault("what it maps depends on numbers that it moves".into()));
+                    return Err(self.fault("the choices it maps depend on values that it changes".into()));
                 }
                 for i in 0..n {
                     matrix[(i, j)] += weight * image[i] / (12.0 * h);
@@ -193,7 +194,15 @@ impl Own {
             }
         }
         let log = libm::log(matrix.determinant().abs());
-        if log.is_finite() { Ok(log) } else { Err(self.fault("its Jacobian is singular or no number".into())) }
+        if log.is_finite() {
+            Ok(log)
+        } else {
+            Err(self.fault(
+                "its Jacobian is singular or not \
+            finite"
+                    .into(),
+            ))
+        }
     }
 }
 

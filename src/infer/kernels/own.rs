@@ -118,7 +118,8 @@ impl Own {
     /// As [`Kernel::step`], and if the body has a map, which only leads from one state to another.
     pub fn leap(&self, trace: &mut Trace, at: &At) -> TraceResult<Option<()>> {
         if maps(&self.declared.body) {
-            let message = "a start proposes choices by distributions, not by a map";
+            let message = "the kernel of a start must propose choices from distributions, not by \
+                           a map";
             return Err(fail(self.declared.name.span, message.into()));
         }
         let mut rng = at.stream();
@@ -169,7 +170,7 @@ impl Play<'_> {
                     let image = self.image(target, trace, variables)?;
                     let proposed = |p: &Proposed| matches!(image, Image::Choice(_, t) if t == p.target);
                     if self.played.images.iter().any(|(i, _)| *i == image) || self.played.all.iter().any(proposed) {
-                        return Err(fail(s.span, "this is given a new value twice in one kernel".into()));
+                        return Err(fail(s.span, "this gets a new value twice in one kernel".into()));
                     }
                     let value = evaluate(value, &mut self.env(trace, variables))?;
                     self.played.images.push((image, value));
@@ -192,7 +193,8 @@ impl Play<'_> {
                     self.played.all.push(proposed);
                 }
                 _ => {
-                    let message = "a kernel that proposes has only `let`, `for` and `propose` in it";
+                    let message = "a kernel with `propose` may contain only `let`, `for` and \
+                                   `propose`";
                     let mut e = fail(s.span, message.into());
                     e.hint = Some("kernels that apply other kernels are written without `propose`".into());
                     return Err(e);
@@ -253,7 +255,15 @@ impl Play<'_> {
             return Ok(Image::Choice(address, found));
         };
         let drawn = self.played.drawn.iter().rposition(|d| d.name == *name);
-        let not = || fail(target.span, format!("`{name}` is no auxiliary variable: propose {name} ~ …; makes one"));
+        let not = || {
+            fail(
+                target.span,
+                format!(
+                    "`{name}` is not an auxiliary variable; propose \
+            {name} ~ …; makes one"
+                ),
+            )
+        };
         drawn.map(Image::Auxiliary).ok_or_else(not)
     }
 
@@ -266,8 +276,12 @@ impl Play<'_> {
     ) -> TraceResult<(Address, Target)> {
         let at = address(target, &mut self.env(trace, variables))?;
         let Some(found) = trace.find(&at) else {
-            let mut e = fail(target.span, format!("there is no choice {at} in this state"));
-            e.hint = Some("a kernel can only propose choices that are there; mh and block make others appear".into());
+            let mut e = fail(target.span, format!("this state has no choice {at}"));
+            e.hint = Some(
+                "a kernel can propose only choices that exist in the current state; mh \
+                           and block can create others"
+                    .into(),
+            );
             return Err(e);
         };
         Ok((at, found))

@@ -98,9 +98,16 @@ impl<W: Way> Independent<W> {
             && !at.adapting
         {
             let name = self.way.name();
-            let mut e = fail(self.span, format!("another kernel moved the state between two steps of {name}"));
+            let mut e = fail(
+                self.span,
+                format!(
+                    "another kernel changed the state between two \
+                steps of {name}"
+                ),
+            );
             e.hint = Some(format!(
-                "{name} draws whole states by itself; its estimate of the evidence belongs to the state it drew"
+                "{name} draws complete states; its evidence estimate is valid only for the state \
+                 it drew"
             ));
             return Err(e);
         }

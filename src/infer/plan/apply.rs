@@ -46,7 +46,7 @@ impl Runner<'_> {
     /// Applies a kernel, or another statement that looks like a call; in a `mix` it is one of the arms.
     pub(super) fn apply(&mut self, e: &Expr, arm: Option<usize>, doing: Doing) -> Result<Flow, ChainError> {
         let Some((name, args)) = call(e) else {
-            return Err(fail(e.span, "a kernel such as mh(one(@**)) was expected".into()).into());
+            return Err(fail(e.span, "expected a kernel, such as mh(one(@**))".into()).into());
         };
         match name {
             "init" => return Ok(Flow::Next),
@@ -94,8 +94,7 @@ impl Runner<'_> {
         arm: Option<usize>,
     ) -> Result<Flow, ChainError> {
         if self.path.len() >= MOST_NESTED {
-            let message =
-                format!("statements and kernels of a plan are within each other more than {MOST_NESTED} deep");
+            let message = format!("statements and kernels of the plan are nested more than {MOST_NESTED} deep");
             return Err(fail(e.span, message).into());
         }
         self.note(Doing::Kernel { arm, steps: 0, done: Outcome::default() });
@@ -138,7 +137,10 @@ impl Runner<'_> {
                 i
             }
             None if self.instances.len() >= MOST => {
-                let message = format!("this run has {MOST} kernels: those with other arguments are others");
+                let message = format!(
+                    "this run already has {MOST} kernels (a kernel with \
+                                       different arguments counts as another)"
+                );
                 return Err(fail(e.span, message).into());
             }
             None => {

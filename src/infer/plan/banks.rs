@@ -76,7 +76,15 @@ pub(in crate::infer) fn neighbours(
         None => K,
         Some(k) => match evaluate(k, env)? {
             Value::Num(x) if whole(x).is_some() => x as usize,
-            v => return Err(fail(k.span, format!("knn: `k` is a whole number from 1 to {MOST}, got {v}"))),
+            v => {
+                return Err(fail(
+                    k.span,
+                    format!(
+                        "knn: `k` must be a whole number from 1 to \
+                {MOST}, got {v}"
+                    ),
+                ));
+            }
         },
     };
     find(options, e, &name, k)

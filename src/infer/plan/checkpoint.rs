@@ -164,13 +164,13 @@ impl<'a> Runner<'a> {
         c: Checkpoint,
     ) -> Result<Self, ChainError> {
         if (c.seed, c.chain) != (options.seed, chain) {
-            let message = format!("the checkpoint is of chain {} under seed {}", u64::from(c.chain) + 1, c.seed);
+            let message = format!("the checkpoint belongs to chain {} with seed {}", u64::from(c.chain) + 1, c.seed);
             return Err(StateError::new(message).into());
         }
         let count = c.state.len();
         let (trace, _) = Trace::generate(Arc::clone(code), c.state, Draws::default(), options.limits.clone())?;
         if trace.choice_count() != count {
-            return Err(StateError::new("the checkpoint has other choices than the program").into());
+            return Err(StateError::new("the checkpoint's choices are not those of the program").into());
         }
         if let Some(watch) = &options.watch {
             watch.load(chain, &c.watch)?;

@@ -145,7 +145,7 @@ impl<'a> Runner<'a> {
                 flow => flow?,
             };
             if !self.way.is_empty() {
-                return Err(StateError::new("the checkpoint is of another plan").into());
+                return Err(StateError::new("the checkpoint belongs to another plan").into());
             }
             self.finished = flow != Flow::End;
             if self.draws == 0 {
@@ -208,7 +208,7 @@ impl<'a> Runner<'a> {
     pub fn count(&mut self, e: &Expr) -> Result<u64, Box<RunError>> {
         match self.value(e)? {
             Value::Num(x) if x >= 0.0 && x == libm::trunc(x) => Ok(x as u64),
-            v => Err(fail(e.span, format!("a whole number of times was expected, got {v}"))),
+            v => Err(fail(e.span, format!("expected a whole number of repetitions, got {v}"))),
         }
     }
 

@@ -36,16 +36,29 @@ impl Runner<'_> {
     /// `anneal(from)`: raises the power of the likelihood from 1/from to 1 over a warm-up.
     pub(super) fn anneal(&mut self, e: &Expr, args: &[Arg]) -> Result<Flow, ChainError> {
         if !self.in_warmup {
-            return Err(fail(e.span, "anneal belongs in a warmup: its draws are discarded".into()).into());
+            return Err(fail(
+                e.span,
+                "`anneal` is allowed only in `warmup`, whose draws are \
+                                     discarded"
+                    .into(),
+            )
+            .into());
         }
         let from = match args {
             [a] => match self.value(&a.value)? {
                 Value::Num(t) if t >= 1.0 => t,
                 v => {
-                    return Err(fail(a.value.span, format!("a temperature of at least 1 was expected, got {v}")).into());
+                    return Err(fail(
+                        a.value.span,
+                        format!(
+                            "expected a temperature of at least 1, \
+                        got {v}"
+                        ),
+                    )
+                    .into());
                 }
             },
-            _ => return Err(fail(e.span, "anneal takes one temperature to start from".into()).into()),
+            _ => return Err(fail(e.span, "anneal takes one argument, the initial temperature".into()).into()),
         };
         let number = |name: &str| match self.variables.iter().rev().find(|(n, _)| &**n == name) {
             Some((_, Value::Num(x))) => *x,

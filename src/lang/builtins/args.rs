@@ -184,7 +184,10 @@ impl<'a> Args<'a> {
     #[doc(hidden)]
     pub fn too_many(&self, n: f64) -> Fault {
         let message = format!("{}: an array of {n} elements is too long", self.builtin.full_name());
-        Fault::new(FaultKind::Limit, message).with_hint(format!("at most {MOST_ELEMENTS} are made in one go"))
+        Fault::new(FaultKind::Limit, message).with_hint(format!(
+            "at most {MOST_ELEMENTS} can be \
+            made in one call"
+        ))
     }
 
     /// A vector of exactly three numbers, or one number for all three, or a default.

@@ -22,12 +22,13 @@ pub(super) fn ordered(a: &Args) -> Result<Dist, Fault> {
     let made = match a.get(0) {
         Value::Dist(d) if a.given(1) => dist::Ordered::new(Dist::clone(d), a.count(1)?),
         Value::Dist(_) => {
-            let hint = "ordered(normal(0, 1), 3) is three numbers; unlike priors are listed: ordered([d1, d2])";
-            return Err(Fault::type_error("ordered: `n` says how many numbers of one distribution").with_hint(hint));
+            let hint = "ordered(normal(0, 1), 3) is three numbers; list different priors: \
+                        ordered([d1, d2])";
+            return Err(Fault::type_error("ordered: with a single distribution, `n` is required").with_hint(hint));
         }
         _ if a.given(1) => {
-            let hint = "leave `n` out: there is one number for each distribution of the array";
-            return Err(a.wrong(0, "one distribution where `n` is given").with_hint(hint));
+            let hint = "omit `n`: an array gives one number per distribution";
+            return Err(a.wrong(0, "a single distribution when `n` is given").with_hint(hint));
         }
         Value::List(_) | Value::Array(_) => dist::Ordered::of(distributions(a, 0)?),
         _ => return Err(a.wrong(0, "a distribution or an array of distributions")),

@@ -59,7 +59,7 @@ impl CovarianceValue {
 }
 
 const SD: Arg = opt("sd", Type::Num, "1", "The standard deviation.");
-const LENGTH: Arg = arg("length", Type::Num, "The length over which values stay alike, in units of the points.");
+const LENGTH: Arg = arg("length", Type::Num, "The length scale, in units of the points.");
 
 const fn covariance(
     name: &'static str,
@@ -77,17 +77,17 @@ pub(super) const TABLE: &[Row] = &[
         "Squared exponential, `sd^2 exp(-(x - y)^2 / (2 length^2))`: very smooth functions.",
         |a| value(Covariance::sq_exp(a.num(0)?, a.num_or(1, 1.0)?)),
     ),
-    covariance("matern32", &[LENGTH, SD], "Matérn with nu = 3/2: functions differentiable once.", |a| {
+    covariance("matern32", &[LENGTH, SD], "Matérn with nu = 3/2: once-differentiable functions.", |a| {
         value(Covariance::matern32(a.num(0)?, a.num_or(1, 1.0)?))
     }),
-    covariance("matern52", &[LENGTH, SD], "Matérn with nu = 5/2: functions differentiable twice.", |a| {
+    covariance("matern52", &[LENGTH, SD], "Matérn with nu = 5/2: twice-differentiable functions.", |a| {
         value(Covariance::matern52(a.num(0)?, a.num_or(1, 1.0)?))
     }),
     covariance(
         "periodic",
         &[
-            arg("period", Type::Num, "The distance after which functions repeat, in units of the points."),
-            arg("length", Type::Num, "The length of likeness, as a fraction of a period."),
+            arg("period", Type::Num, "The period, in units of the points."),
+            arg("length", Type::Num, "The length scale, relative to the period."),
             SD,
         ],
         "Periodic, `sd^2 exp(-2 sin^2(pi (x - y) / period) / length^2)`.",

@@ -44,7 +44,7 @@ pub(super) const TABLE: &[Row] = &[
     function(
         "solve",
         SECTION,
-        &[M, arg("b", Type::Array, "A vector, or a matrix of as many rows as `m`.")],
+        &[M, arg("b", Type::Array, "A vector, or a matrix with as many rows as `m`.")],
         Type::Array,
         "The solution x of `matmul(m, x) = b`, for a symmetric positive definite `m`: `matmul(inverse of m, b)` without the inverse.",
         |a| {
@@ -116,7 +116,10 @@ fn read(a: &Args) -> Result<Factor, Fault> {
     let (name, n) = (a.builtin.full_name(), m.rows.len());
     if m.width != n {
         let message = format!("{name}: `m` must be square, got {n} x {}", m.width);
-        return Err(Fault::type_error(message).with_hint("a covariance has a row and a column for each variable"));
+        return Err(Fault::type_error(message).with_hint(
+            "a covariance matrix has one row and one \
+            column per variable",
+        ));
     }
     let entries = m.rows.iter().flat_map(|r| r.iter());
     let largest = entries.clone().fold(0.0, |most: f64, x| most.max(x.abs()));
@@ -135,10 +138,13 @@ fn read(a: &Args) -> Result<Factor, Fault> {
     }
     let lower = m.rows.iter().enumerate().flat_map(|(i, r)| r[..=i].iter().copied()).collect();
     Factor::new(n, lower).map_err(|rows| {
-        let message = format!("{name}: `m` must be positive definite, its leading block of {rows} rows is not");
+        let message = format!(
+            "{name}: `m` must be positive definite, but its leading block of \
+                               {rows} rows is not"
+        );
         Fault::domain(message).with_hint(
-            "a covariance needs positive variances and correlations within -1 to 1; a small number more on the diagonal \
-             helps against rounding",
+            "a covariance matrix has positive variances and correlations between -1 and 1; adding \
+             a small number to the diagonal helps against rounding errors",
         )
     })
 }
@@ -153,7 +159,7 @@ fn symmetric(n: usize, entry: impl Fn(usize, usize) -> f64) -> Adjoint {
 fn right_side(a: &Args, n: usize) -> Result<Vec<Vec<f64>>, Fault> {
     let wrong = |rows: usize| {
         Fault::type_error(format!("solve: `b` must have as many rows as `m`, {n}, got {rows}"))
-            .with_hint("it is the matrix that comes first: solve(m, b)")
+            .with_hint("the matrix comes first: solve(m, b)")
     };
     if let Value::Array(b) = a.get(1) {
         return if b.len() == n { Ok(vec![b.to_vec()]) } else { Err(wrong(b.len())) };

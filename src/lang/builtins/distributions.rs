@@ -83,7 +83,7 @@ pub(super) const TABLE: &[Row] = &[
         "von_mises",
         &[
             arg("mean", Type::Nums, "The mean direction: any finite number.").unit("radians"),
-            arg("concentration", Type::Nums, "How narrow it is, not negative; 0 is uniform."),
+            arg("concentration", Type::Nums, "The concentration, not negative; 0 is uniform."),
         ],
         |a| elementwise(a, &[], |[mean, k]| dist::VonMises::new(mean, k).map(Dist::VonMises)),
     ),
@@ -111,25 +111,26 @@ pub(super) const TABLE: &[Row] = &[
         make: |weights| dist::Categorical::new(Arc::clone(weights)).map(Dist::Categorical).ok(),
         log_probability: |weights, x| dist::Categorical::log_probability(weights, x).ok(),
     }),
-    other("dirichlet", &[arg("alpha", Type::Array, "One positive concentration for each share.")], |a| {
+    other("dirichlet", &[arg("alpha", Type::Array, "One positive concentration per component.")], |a| {
         dist::Dirichlet::new(&a.array(0)?).map(|d| Dist::Dirichlet(Arc::new(d))).map_err(fault)
     }),
     other(
         "multinomial",
         &[
-            arg("n", Type::Int, "How many draws."),
-            arg("weights", Type::Array, "One weight for each kind; they need not sum to 1."),
+            arg("n", Type::Int, "The number of draws."),
+            arg("weights", Type::Array, "One weight per category; they need not sum to 1."),
         ],
         |a| dist::Multinomial::new(a.num(0)?, &a.array(1)?).map(|d| Dist::Multinomial(Arc::new(d))).map_err(fault),
     ),
     other(
         "lkj",
         &[
-            arg("n", Type::Int, "How many rows, from 1 to 1000."),
+            arg("n", Type::Int, "The number of rows, from 1 to 1000."),
             arg(
                 "eta",
                 Type::Num,
-                "The shape, positive: 1 is uniform over correlation matrices, more is closer to independence.",
+                "The shape, positive: 1 is uniform over correlation matrices, larger values \
+                 favour independence.",
             ),
         ],
         |a| dist::Lkj::new(a.num(0)?, a.num(1)?).map(|d| Dist::Lkj(Arc::new(d))).map_err(fault),
@@ -137,7 +138,7 @@ pub(super) const TABLE: &[Row] = &[
     other(
         "wishart",
         &[
-            arg("df", Type::Num, "The degrees of freedom, above the number of rows less 1."),
+            arg("df", Type::Num, "The degrees of freedom, above the number of rows minus 1."),
             arg(
                 "scale_chol",
                 Type::Array,
@@ -150,13 +151,20 @@ pub(super) const TABLE: &[Row] = &[
         "mv_normal",
         &[
             arg("mean", Type::Array, "The mean vector."),
-            opt("cov", Type::Array, "none", "The covariance matrix, an array of rows; or `chol`, one of them."),
+            opt(
+                "cov",
+                Type::Array,
+                "none",
+                "The covariance matrix, an array of rows; give either \
+                `cov` or `chol`.",
+            ),
             opt("chol", Type::Array, "none", "The lower triangular Cholesky factor of the covariance."),
             opt(
                 "whitened",
                 Type::Bool,
                 "false",
-                "Stores the white noise z of mean + chol z, so that the value follows when these move.",
+                "Non-centred: stores the white noise z of mean + chol z, so that the value \
+                 follows changes of the mean and covariance.",
             ),
         ],
         mv_normal,
@@ -164,32 +172,56 @@ pub(super) const TABLE: &[Row] = &[
     other(
         "gp",
         &[
-            arg("mean", Type::Nums, "The mean: one number, or one for each point."),
+            arg("mean", Type::Nums, "The mean: one number, or one per point."),
             arg("cov", Type::Covariance, "The covariance function, such as `sq_exp(length)`."),
             arg("at", Type::Array, "The points."),
-            opt("centred", Type::Bool, "false", "Stores the values, instead of the white noise that makes them."),
-            opt("jitter", Type::Num, "1e-6", "What is added to the diagonal of the covariance matrix.")
-                .unit("shares of the variance"),
+            opt(
+                "centred",
+                Type::Bool,
+                "false",
+                "Centred: stores the values instead of the \
+                underlying white noise.",
+            ),
+            opt("jitter", Type::Num, "1e-6", "Added to the diagonal of the covariance matrix.")
+                .unit("fraction of the variance"),
         ],
         gp,
     ),
-    other("iid", &[arg("d", Type::Dist, "A distribution."), arg("n", Type::Int, "How many.")], |a| {
-        let Value::Dist(d) = a.get(0) else { return Err(a.wrong(0, "a distribution")) };
-        dist::Iid::new(Dist::clone(d), a.count(1)?).map(|d| Dist::Iid(Arc::new(d))).map_err(fault)
-    }),
+    other(
+        "iid",
+        &[
+            arg("d", Type::Dist, "A distribution."),
+            arg(
+                "n",
+                Type::Int,
+                "The number of \
+        values.",
+            ),
+        ],
+        |a| {
+            let Value::Dist(d) = a.get(0) else { return Err(a.wrong(0, "a distribution")) };
+            dist::Iid::new(Dist::clone(d), a.count(1)?).map(|d| Dist::Iid(Arc::new(d))).map_err(fault)
+        },
+    ),
     other(
         "ordered",
         &[
             arg("d", Type::Any, "A distribution of continuous numbers, or an array of them."),
-            opt("n", Type::Int, "none", "How many of one distribution; of an array there is one of each."),
+            opt(
+                "n",
+                Type::Int,
+                "none",
+                "The number of values from a single distribution; an \
+                array gives one of each.",
+            ),
         ],
         ordered,
     ),
     other(
         "mixture",
         &[
-            arg("weights", Type::Array, "One weight for each component; they need not sum to 1."),
-            arg("components", Type::Array, "Distributions with the same kind of values."),
+            arg("weights", Type::Array, "One weight per component; they need not sum to 1."),
+            arg("components", Type::Array, "Distributions over the same kind of values."),
         ],
         mixture,
     ),
@@ -208,9 +240,14 @@ pub(super) fn notes(name: &str) -> Vec<(&'static str, String)> {
 pub(super) fn fault(e: ParamError) -> Fault {
     let fault = Fault::domain(e.to_string());
     match e.rule {
-        rule if rule.starts_with("must be positive") => fault
-            .with_hint("what must be positive is drawn from half_normal, gamma or lognormal, or is exp of a number"),
-        "must make a positive definite matrix" => fault.with_hint("a larger `jitter` makes it so, or `+ white(sd)`"),
+        rule if rule.starts_with("must be positive") => fault.with_hint(
+            "for a positive parameter use half_normal, gamma or lognormal as prior, or \
+                        exp of a number",
+        ),
+        "must make a positive definite matrix" => fault.with_hint(
+            "use a larger `jitter`, or add \
+            `+ white(sd)`",
+        ),
         _ => fault,
     }
 }
@@ -364,7 +401,7 @@ const fn family(name: &str) -> &'static Family {
         }
         i += 1;
     }
-    panic!("no such family of distributions")
+    panic!("no such distribution")
 }
 
 const fn same_text(a: &str, b: &str) -> bool {
@@ -379,7 +416,7 @@ const fn same_text(a: &str, b: &str) -> bool {
 /// The parameters of a family as arguments.
 const fn params<const N: usize>(name: &str) -> [Arg; N] {
     let family = family(name);
-    assert!(family.params.len() == N, "the family has another number of parameters");
+    assert!(family.params.len() == N, "the distribution has a different number of parameters");
     let mut args = [arg("", Type::Nums, ""); N];
     let mut i = 0;
     while i < N {

@@ -86,7 +86,7 @@ pub(super) fn common_len(a: &Args, x: &Value, y: &Value) -> Result<Option<usize>
     match (array_len(x), array_len(y)) {
         (Some(m), Some(n)) if m != n => {
             let name = a.builtin.full_name();
-            Err(Fault::type_error(format!("{name}: an array of {m} and an array of {n} do not go together")))
+            Err(Fault::type_error(format!("{name}: arrays of lengths {m} and {n} do not match")))
         }
         (m, n) => Ok(m.or(n)),
     }

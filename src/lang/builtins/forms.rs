@@ -16,34 +16,36 @@ pub(super) const TABLE: &[Row] = &[
             arg("xs", Type::Any, "An array or record."),
         ],
         Type::Any,
-        "The results of `f` for each element, in the shape of `xs`; addresses get the position or name as key.",
+        "The results of `f` for each element, in the shape of `xs`; the position or name becomes \
+         a key in addresses.",
         Form::Map,
     ),
     form(
         "fold",
         &[
             arg("f", Type::Function, "A function of the running value and an element; it may draw."),
-            arg("init", Type::Any, "The first running value."),
+            arg("init", Type::Any, "The initial value."),
             arg("xs", Type::Any, "An array or record."),
         ],
         Type::Any,
-        "The last running value after all elements from left to right.",
+        "The final running value, after all elements from left to right.",
         Form::Fold,
     ),
     form(
         "mem",
         &[arg("f", Type::Function, "A function; its arguments must be numbers, strings, bools or arrays of them.")],
         Type::Function,
-        "A function that calls `f` once per distinct argument and remembers what it drew.",
+        "A function that calls `f` once per distinct argument and remembers its result \
+         (stochastic memoisation).",
         Form::Mem,
     ),
     form("log_joint", &[], Type::Num, "The log joint density of all choices and observations.", Form::LogJoint),
-    form("log_prior", &[], Type::Num, "The log density of the unobserved choices.", Form::LogPrior),
+    form("log_prior", &[], Type::Num, "The log prior density of the unobserved choices.", Form::LogPrior),
     form(
         "log_likelihood",
         &[],
         Type::Num,
-        "The log density of the observations, factors included.",
+        "The log likelihood of the observations, factors included.",
         Form::LogLikelihood,
     ),
 ];

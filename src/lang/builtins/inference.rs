@@ -27,11 +27,12 @@ const MARGINAL: Arg = opt(
     "marginal",
     Type::Selection,
     "none",
-    "Finite discrete choices that are summed out of the density it sees, then drawn given the rest. Those that no score \
-     can read together are summed one by one, others jointly (at most 1000 joint values). What cannot be summed out is refused.",
+    "Finite discrete choices to marginalise: they are summed out of the density and then drawn \
+     given the rest. Choices that no score depends on together are summed one by one, others \
+     jointly (at most 1000 joint values). Choices that cannot be summed out are an error.",
 );
-const INNER: Arg = arg("move", Type::Kernel, "The kernel inside.");
-const X: Arg = arg("x", Type::Any, "A number of the model, as in `collect`.");
+const INNER: Arg = arg("move", Type::Kernel, "The inner kernel.");
+const X: Arg = arg("x", Type::Any, "A numeric quantity of the model, as in `collect`.");
 
 pub(super) const TABLE: &[Row] = &[
     name(
@@ -39,14 +40,14 @@ pub(super) const TABLE: &[Row] = &[
         KERNELS,
         &[SEL],
         Type::Kernel,
-        "Metropolis-Hastings that draws one of the selected choices anew from its prior.",
+        "Metropolis-Hastings that proposes a single selected choice from its prior.",
     ),
     name(
         "block",
         KERNELS,
         &[SEL],
         Type::Kernel,
-        "Metropolis-Hastings that draws all selected choices together anew from their prior.",
+        "Metropolis-Hastings that proposes all selected choices jointly from their prior.",
     ),
     name(
         "drift",
@@ -57,18 +58,19 @@ pub(super) const TABLE: &[Row] = &[
                 "scale",
                 Type::Num,
                 "learnt",
-                "A fixed step size in the unconstrained space, instead of one learnt in warm-up.",
+                "A fixed step size in the unconstrained space, instead of one adapted in warm-up.",
             ),
         ],
         Type::Kernel,
-        "Gaussian random walk in the unconstrained space of the support; discrete choices step to another value.",
+        "Gaussian random walk in the unconstrained space; discrete choices move to another value.",
     ),
     name(
         "gibbs",
         KERNELS,
         &[SEL],
         Type::Kernel,
-        "Draws a selected finite discrete choice from its exact conditional, by enumeration of its values.",
+        "Draws a selected finite discrete choice from its full conditional, by enumeration of its \
+         values.",
     ),
     name(
         "elliptical",
@@ -86,13 +88,15 @@ pub(super) const TABLE: &[Row] = &[
                 "width",
                 Type::Num,
                 "learnt",
-                "The width of a step out, in the unconstrained space; without it, 1, and warm-up adapts it.",
+                "The width of the initial interval, in the unconstrained space; by default 1, \
+                 adapted in warm-up.",
             ),
             opt(
                 "doubling",
                 Type::Bool,
                 "false",
-                "The interval doubles instead of growing by steps: for slices much wider than `width`.",
+                "Expands the interval by doubling instead of stepping out: for slices much wider \
+                 than `width`.",
             ),
         ],
         Type::Kernel,
@@ -101,14 +105,24 @@ pub(super) const TABLE: &[Row] = &[
     name(
         "hmc",
         KERNELS,
-        &[SEL, opt("steps", Type::Int, "10", "The leapfrog steps of one proposal."), MARGINAL],
+        &[SEL, opt("steps", Type::Int, "10", "The number of leapfrog steps per proposal."), MARGINAL],
         Type::Kernel,
         "Hamiltonian Monte Carlo; step size and metric are adapted in warm-up (Neal 2011).",
     ),
     name(
         "nuts",
         KERNELS,
-        &[SEL, opt("max_depth", Type::Int, "10", "At most 2 to this power leapfrog steps."), MARGINAL],
+        &[
+            SEL,
+            opt(
+                "max_depth",
+                Type::Int,
+                "10",
+                "The maximum tree depth: at most 2^max_depth \
+            leapfrog steps.",
+            ),
+            MARGINAL,
+        ],
         Type::Kernel,
         "The No-U-Turn sampler (Hoffman and Gelman 2014).",
     ),
@@ -117,7 +131,7 @@ pub(super) const TABLE: &[Row] = &[
         KERNELS,
         &[SEL, MARGINAL],
         Type::Kernel,
-        "The Metropolis-adjusted Langevin algorithm: one gradient a proposal.",
+        "The Metropolis-adjusted Langevin algorithm: one gradient per proposal.",
     ),
     name(
         "knn",
@@ -125,18 +139,20 @@ pub(super) const TABLE: &[Row] = &[
         &[
             SEL,
             arg("bank", Type::Str, "A file made by `pcadlang learn`."),
-            opt("k", Type::Int, "10", "How many neighbours."),
+            opt("k", Type::Int, "10", "The number of neighbours."),
         ],
         Type::Kernel,
-        "Independence proposal from the latents of the pictures in a bank that look most like the observed one.",
+        "Data-driven independence proposal: a kernel density estimate over the latents of the \
+         bank's pictures nearest to the observed one.",
     ),
     name(
         "delayed",
         KERNELS,
         &[INNER, arg("at", Type::Selection, "The observation with a coarse surrogate.")],
         Type::Kernel,
-        "Delayed acceptance: the surrogate of `observe … with coarse = …` decides first; only what passes is judged by the observation \
-         itself (Christen and Fox 2005). Exact whatever the surrogate says, if it is possible wherever the observation is.",
+        "Delayed acceptance: proposals are screened by the surrogate of `observe … with coarse = \
+         …`; only those that pass are evaluated under the observation itself (Christen and Fox \
+         2005). Exact for any surrogate that is positive wherever the likelihood is.",
     ),
     name(
         "temper",
@@ -144,118 +160,149 @@ pub(super) const TABLE: &[Row] = &[
         &[
             INNER,
             opt("levels", Type::Int, "6", "The number of temperatures."),
-            opt("hottest", Type::Num, "0.01", "The lowest power of the likelihood; warm-up spaces the ladder."),
+            opt(
+                "hottest",
+                Type::Num,
+                "0.01",
+                "The lowest power of the likelihood; warm-up adapts \
+                the ladder of temperatures.",
+            ),
         ],
         Type::Kernel,
-        "Replica exchange over powers of the likelihood: each step moves every replica, then neighbours swap (Geyer 1991).",
+        "Replica exchange (parallel tempering) over powers of the likelihood: each step updates \
+         every replica, then proposes swaps of neighbours (Geyer 1991).",
     ),
     name(
         "smc",
         KERNELS,
         &[INNER, opt("particles", Type::Int, "100", "The number of particles.")],
         Type::Kernel,
-        "Whole states by annealed sequential Monte Carlo, moved by the kernel inside, accepted by their estimates of the evidence \
-         (particle independent Metropolis-Hastings, Andrieu et al. 2010). No other kernel may move the state in between.",
+        "Proposes complete states by annealed sequential Monte Carlo with the inner kernel, \
+         accepted by their evidence estimates (particle independent Metropolis-Hastings, Andrieu \
+         et al. 2010). No other kernel may change the state in between.",
     ),
     name(
         "abc",
         KERNELS,
         &[
             INNER,
-            arg("eps", Type::Num, "The largest distance that is accepted."),
+            arg("eps", Type::Num, "The tolerance: the largest accepted distance."),
             opt(
                 "particles",
                 Type::Int,
                 "none",
-                "Each step draws a whole state by so many particles, as `smc` does, with tolerances that fall to `eps` (Del Moral \
-                 et al. 2012).",
+                "With this many particles, each step draws a complete state as `smc` does, with \
+                 tolerances decreasing to `eps` (Del Moral et al. 2012).",
             ),
-            opt("moves", Type::Int, "1", "How often each particle moves at each tolerance."),
+            opt("moves", Type::Int, "1", "The number of moves of each particle at each tolerance."),
         ],
         Type::Kernel,
-        "Likelihood-free: the kernel inside proposes from the prior, and what it proposes stays if data drawn from it are near those \
-         observed, in root mean square (Marjoram et al. 2003).",
+        "Approximate Bayesian computation (likelihood-free): the inner kernel targets the prior, \
+         and a proposal is accepted if data simulated from it are within `eps` of the observed \
+         data in root mean square (Marjoram et al. 2003).",
     ),
     name(
         "modes",
         KERNELS,
         &[
             SEL,
-            opt("tries", Type::Int, "200", "Draws from the prior among which starts are looked for."),
-            opt("keep", Type::Int, "16", "How many of them, the likeliest, climb to a mode."),
-            opt("steps", Type::Int, "60", "The most steps of a climb."),
+            opt(
+                "tries",
+                Type::Int,
+                "200",
+                "The number of draws from the prior, from which \
+                starting points are chosen.",
+            ),
+            opt(
+                "keep",
+                Type::Int,
+                "16",
+                "The number of these, the most probable, that climb to a \
+                mode.",
+            ),
+            opt("steps", Type::Int, "60", "The maximum number of optimisation steps per climb."),
             opt(
                 "first",
                 Type::Selection,
                 "none",
-                "Choices that climb alone in each draw, some steps, before draws are compared.",
+                "Choices that are optimised alone for some steps in each draw, before draws are \
+                 compared.",
             ),
             opt(
                 "at",
                 Type::Selection,
                 "none",
-                "Observations in whose place their coarse surrogates stand while modes are looked for.",
+                "Observations that are replaced by their coarse surrogates during the search for \
+                 modes.",
             ),
         ],
         Type::Kernel,
-        "Jumps between modes. Its first step looks for them: the likeliest of some draws of the selected choices climb by L-BFGS, of \
-         which half, and half again, go on to the top; in warm-up the state then becomes one of the modes, drawn by the Laplace estimates \
-         of their evidence, and with `at` climbs on under the observations themselves (what no surrogate asks for is not among the modes). From then on all selected choices are proposed together from the Laplace approximations of all modes \
-         (independent Metropolis-Hastings, Tierney 1994).",
+        "Jumps between modes. The first step searches for them: the most probable draws of the \
+         selected choices climb by L-BFGS, in rounds that each keep the better half; in warm-up \
+         the state then moves to one of the modes, drawn by the Laplace estimates of their \
+         evidence, and with `at` it climbs further under the observations themselves (choices \
+         that no surrogate depends on are left out). After that, all selected choices are \
+         proposed jointly from a mixture of Laplace approximations at the modes (independent \
+         Metropolis-Hastings, Tierney 1994).",
     ),
     name(
         "optimize",
         KERNELS,
         &[SEL, opt("steps", Type::Int, "100", "The number of gradient steps.")],
         Type::Kernel,
-        "Climbs to a mode of the posterior; for a start, or an answer in a hurry. Not a sampler.",
+        "Climbs to a mode of the posterior: for starting points or quick answers. Not a sampler.",
     ),
     name(
         "one",
         CHOICES,
         &[SEL],
         Type::Selection,
-        "One of the selected choices, picked uniformly at each step; the ratio of their numbers is paid for.",
+        "One of the selected choices, picked uniformly at each step; the acceptance ratio \
+         corrects for changes in their number.",
     ),
     name(
         "each",
         CHOICES,
         &[SEL],
         Type::Selection,
-        "Each of the selected choices in turn, in the program's order: a sweep of as many steps. For mh, gibbs and drift.",
+        "Each of the selected choices in turn, in program order: a sweep with one step per \
+         choice. For mh, gibbs and drift.",
     ),
     name(
         "init",
         CHOICES,
         &[arg("start", Type::Kernel, "`prior()` or `best_of(n)`.")],
         Type::Kernel,
-        "How a chain starts; without it, from the prior.",
+        "Sets how a chain starts; by default, from the prior.",
     ),
     name(
         "anneal",
         CHOICES,
-        &[arg("from", Type::Num, "The temperature at the start, at least 1.")],
+        &[arg("from", Type::Num, "The initial temperature, at least 1.")],
         Type::Kernel,
-        "In `warmup` only: raises the power of the likelihood from `1 / from` to 1 over the warm-up. With several starts kept, \
-         population annealing: they move in turn, and the likelier have more offspring.",
+        "In `warmup` only: raises the power of the likelihood from `1 / from` to 1 over the \
+         warm-up. If several starts are kept, this is population annealing: they move in turn, \
+         and are resampled by their weights.",
     ),
     name("prior", CHOICES, &[], Type::Kernel, "A start drawn from the prior."),
     name(
         "best_of",
         CHOICES,
         &[
-            arg("n", Type::Int, "How many draws from the prior."),
+            arg("n", Type::Int, "The number of draws from the prior."),
             opt(
                 "keep",
                 Type::Int,
                 "1",
-                "How many of the best begin a population that `anneal` thins out to one state.",
+                "The number of best draws to start a population, which `anneal` reduces to one \
+                 state.",
             ),
             opt(
                 "from",
                 Type::Kernel,
                 "none",
-                "A kernel of the program, by whose proposals each draw is moved before they are compared, whatever their densities say.",
+                "A kernel declared in the program: its proposals, always accepted, move each draw \
+                 before the draws are compared.",
             ),
         ],
         Type::Kernel,
@@ -266,11 +313,18 @@ pub(super) const TABLE: &[Row] = &[
         CHOICES,
         &[arg("at", Type::Selection, "The address of one choice.")],
         Type::Any,
-        "The present value of a choice, in user kernels and conditions.",
+        "The current value of a choice, in user kernels and conditions.",
     ),
-    name("elapsed", MONITORS, &[], Type::Num, "The time since the chain began, in seconds."),
-    name("steps", MONITORS, &[], Type::Int, "The number of kernel applications of this chain so far."),
-    name("acceptance", MONITORS, &[], Type::Num, "The fraction of proposals that this chain accepted after warm-up."),
+    name("elapsed", MONITORS, &[], Type::Num, "The time since the chain started, in seconds."),
+    name(
+        "steps",
+        MONITORS,
+        &[],
+        Type::Int,
+        "The number of kernel applications in this chain so \
+        far.",
+    ),
+    name("acceptance", MONITORS, &[], Type::Num, "The acceptance rate of this chain after warm-up."),
     name(
         "rhat",
         MONITORS,
@@ -282,14 +336,14 @@ pub(super) const TABLE: &[Row] = &[
     name(
         "snapshot",
         MONITORS,
-        &[arg("view", Type::Object("view"), "What is drawn.")],
+        &[arg("view", Type::Object("view"), "The view to draw.")],
         Type::Kernel,
-        "Writes a picture of the view as it is now to the run's folder.",
+        "Writes a picture of the current view to the run's folder.",
     ),
     name(
         "summary",
         MONITORS,
-        &[opt("sel", Type::Selection, "@**", "The choices summarised.")],
+        &[opt("sel", Type::Selection, "@**", "The choices to summarise.")],
         Type::Any,
         "Mean, sd, interval, effective sample size and R-hat of each selected choice.",
     ),

@@ -10,12 +10,12 @@ pub(super) const TABLE: &[Row] = &[function(
     "interp",
     "Arrays and records",
     &[
-        arg("x", Type::Nums, "Where to read: a number or an array of them."),
-        arg("xs", Type::Array, "The places of the table, in ascending order."),
-        arg("ys", Type::Array, "As many values."),
+        arg("x", Type::Nums, "The points to evaluate at: a number or an array of numbers."),
+        arg("xs", Type::Array, "The abscissae of the table, in ascending order."),
+        arg("ys", Type::Array, "The values there, as many."),
     ],
     Type::Nums,
-    "The straight lines through a table of points, read at `x`; beyond its ends the values there.",
+    "Linear interpolation of a table at `x`; constant beyond its ends.",
     interp,
 )
 .pull(pull)];
@@ -24,11 +24,11 @@ fn interp(a: &Args) -> Result<Value, Fault> {
     let xs = a.numbers_from(1, 1)?;
     let ys = a.numbers(2)?;
     if ys.len() != xs.len() {
-        return Err(a.wrong_length(2, &format!("{} numbers, as many as there are places", xs.len())));
+        return Err(a.wrong_length(2, &format!("{} numbers, as many as `xs`", xs.len())));
     }
     // Also false of NaN.
     if !xs.is_sorted_by(|a, b| a <= b) {
-        return Err(Fault::domain("interp: the places `xs` must ascend"));
+        return Err(Fault::domain("interp: `xs` must be ascending"));
     }
     let read = |x: f64| {
         let above = xs.partition_point(|p| *p <= x);

@@ -33,7 +33,7 @@ pub(super) const TABLE: &[Row] = &[
         &[
             arg("lo", Type::Num, "The first number."),
             arg("hi", Type::Num, "The last number."),
-            arg("n", Type::Int, "How many; a single one is `lo`."),
+            arg("n", Type::Int, "The number of points; a single point is `lo`."),
         ],
         Type::Array,
         "`n` evenly spaced numbers from `lo` to `hi`, both included.",
@@ -54,11 +54,11 @@ pub(super) const TABLE: &[Row] = &[
         SECTION,
         &[
             arg("start", Type::Num, "The first number."),
-            arg("end", Type::Num, "The end, itself left out."),
-            opt("step", Type::Num, "1", "The difference of neighbours; may be negative, not 0."),
+            arg("end", Type::Num, "The end, excluded."),
+            opt("step", Type::Num, "1", "The step, not 0; may be negative."),
         ],
         Type::Array,
-        "`start`, `start + step`, … before `end`; for whole numbers write `a .. b`.",
+        "`start`, `start + step`, … up to but excluding `end`; for whole numbers write `a .. b`.",
         range,
     )
     .pull(|_, y, by| {
@@ -73,7 +73,7 @@ pub(super) const TABLE: &[Row] = &[
         SECTION,
         &[arg("x", Type::Any, "The element."), arg("n", Type::Int, "The number of elements.")],
         Type::Array,
-        "An array of `n` times `x`.",
+        "An array of `n` copies of `x`.",
         |a| match a.get(0) {
             Value::Num(x) => Ok(array(a.count(1)?, |_| *x)),
             x => Ok(Value::from_elements(vec![x.clone(); a.count(1)?])),
@@ -146,7 +146,15 @@ pub(super) const TABLE: &[Row] = &[
     function(
         "zip",
         SECTION,
-        &[arg("xs", Type::Array, "An array."), arg("ys", Type::Array, "Another as long.")],
+        &[
+            arg("xs", Type::Array, "An array."),
+            arg(
+                "ys",
+                Type::Array,
+                "Another array of the same \
+            length.",
+            ),
+        ],
         Type::Array,
         "The array of the pairs `[x, y]`.",
         |a| {
@@ -187,7 +195,7 @@ pub(super) const TABLE: &[Row] = &[
         SECTION,
         &[arg("r", Type::Any, "A record, or an array."), arg("key", Type::Any, "The name of a field, or a position.")],
         Type::Bool,
-        "Whether the record has such a field, or the array such a position.",
+        "Whether the record has this field, or the array this position.",
         |a| match (a.get(0), a.get(1)) {
             (Value::Record(r), Value::Str(k)) => Ok(Value::Bool(r.contains_key(k))),
             (Value::Record(_), _) => Err(a.wrong(1, "a string")),
@@ -201,7 +209,7 @@ pub(super) const TABLE: &[Row] = &[
         },
     )
     .flat(),
-    function("any", SECTION, BOOLS, Type::Bool, "Whether one element at least is true.", |a| {
+    function("any", SECTION, BOOLS, Type::Bool, "Whether at least one element is true.", |a| {
         Ok(Value::Bool(bools(a)?.contains(&true)))
     })
     .flat(),
@@ -214,11 +222,12 @@ pub(super) const TABLE: &[Row] = &[
         SECTION,
         &[
             arg("cond", Type::Any, "A bool, or an array of bools."),
-            arg("a", Type::Any, "What is taken where it is true."),
-            arg("b", Type::Any, "What is taken where it is false."),
+            arg("a", Type::Any, "The result where it is true."),
+            arg("b", Type::Any, "The result where it is false."),
         ],
         Type::Any,
-        "`a` where the condition is true, `b` where it is not, element by element; both are always computed.",
+        "`a` where the condition is true, `b` elsewhere, element by element; both are always \
+         computed.",
         |a| select(a, a.get(0), a.get(1), a.get(2)),
     )
     .pull(|a, z, by| {
@@ -267,7 +276,7 @@ fn range(a: &Args) -> Result<Value, Fault> {
     let (start, end, step) = (a.num(0)?, a.num(1)?, a.num_or(2, 1.0)?);
     let n = libm::ceil((end - start) / step);
     if n.is_nan() || step == 0.0 {
-        return Err(Fault::domain(format!("range: no steps of {step} lead from {start} to {end}")));
+        return Err(Fault::domain(format!("range: steps of {step} do not lead from {start} to {end}")));
     }
     if n > MOST_ELEMENTS as f64 {
         return Err(a.too_many(n));

@@ -11,13 +11,11 @@ use smallvec::smallvec;
 pub(super) const TABLE: &[Row] = &[function(
     "log_density",
     "Distributions",
-    &[
-        arg("d", Type::Dist, "A distribution."),
-        arg("x", Type::Any, "A value as `d` draws it, or an array of such."),
-    ],
+    &[arg("d", Type::Dist, "A distribution."), arg("x", Type::Any, "A value of `d`, or an array of values.")],
     Type::Num,
-    "The log density (of a discrete distribution, the log probability) of `x` under `d`, in nats: -inf outside of the support. \
-     Many values of a distribution of one number are independent, as in `observe`: their log densities are summed.",
+    "The log density (of a discrete distribution, the log probability) of `x` under `d`, in nats: \
+     -inf outside the support. Several values of a scalar distribution are treated as \
+     independent, as in `observe`: their log densities are summed.",
     |a| {
         let d = dist(a)?;
         if !fits(d, a.get(1)) {

@@ -31,7 +31,7 @@ pub(super) const TABLE: &[Row] = &[
         SECTION,
         &[arg("a", Type::Array, "A matrix.")],
         Type::Array,
-        "The matrix with rows and columns exchanged.",
+        "The transpose: the matrix with rows and columns exchanged.",
         |a| {
             let m = Matrix::read(a, 0)?;
             Ok(m.transposed().into_value())
@@ -76,7 +76,7 @@ pub(super) const TABLE: &[Row] = &[
         SECTION,
         &[arg("xs", Type::Array, "A vector."), arg("ys", Type::Array, "A vector.")],
         Type::Array,
-        "The matrix of the products `xs[i] * ys[j]`.",
+        "The outer product: the matrix of the products `xs[i] * ys[j]`.",
         |a| {
             let (xs, ys) = (a.numbers(0)?, a.numbers(1)?);
             a.fits(xs.len().saturating_mul(ys.len()))?;
@@ -95,7 +95,7 @@ pub(super) const TABLE: &[Row] = &[
         SECTION,
         &[arg("n", Type::Int, "The number of rows and columns, at most 3000.")],
         Type::Array,
-        "The unit matrix.",
+        "The identity matrix.",
         |a| {
             let n = a.int_in(0, 0, 3000)? as usize;
             Ok(rows(n, |i| array(n, |j| f64::from(u8::from(i == j)))))

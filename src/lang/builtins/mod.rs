@@ -238,7 +238,7 @@ impl Builtin {
         match d.parts(MOST_NESTED, MOST_ELEMENTS) {
             Some(n) if n <= MOST_ELEMENTS => Ok(d),
             Some(_) => Err(args.too_large("parts", MOST_ELEMENTS)),
-            None => Err(args.too_large("distributions within each other", MOST_NESTED as usize)),
+            None => Err(args.too_large("nested distributions", MOST_NESTED as usize)),
         }
     }
 
@@ -296,7 +296,7 @@ impl Builtin {
             };
             // Too many are counted first, so that the message can say how many.
             if p < order.len() && order[p].replace(i).is_some() {
-                return Err(format!("`{}` gets its argument `{}` twice", self.full_name(), self.args[p].name));
+                return Err(format!("`{}` got its argument `{}` twice", self.full_name(), self.args[p].name));
             }
         }
         if written > order.len() {

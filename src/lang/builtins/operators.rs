@@ -58,7 +58,7 @@ pub(super) const TABLE: &[Row] = &[
     function(
         "neg",
         SECTION,
-        &[arg("a", Type::Nums, "What is negated.")],
+        &[arg("a", Type::Nums, "The operand.")],
         Type::Nums,
         "Negation `-a`, element by element.",
         mapped,
@@ -101,7 +101,7 @@ pub(super) const TABLE: &[Row] = &[
         SECTION,
         &[
             arg("lo", Type::Int, "The first number."),
-            arg("hi", Type::Int, "The end, itself left out; nothing is left when it is not above `lo`."),
+            arg("hi", Type::Int, "The end, excluded; the range is empty if it is not above `lo`."),
         ],
         Type::Array,
         "The whole numbers from `lo` up to but not including `hi`.",
@@ -222,7 +222,7 @@ fn unsuited(a: &Args, wanted: &str, x: &Value, y: &Value) -> Fault {
             fault.with_hint("`if b { 1 } else { 0 }` makes a number of a bool")
         }
         (Value::Dist(_), _) | (_, Value::Dist(_)) => {
-            fault.with_hint("draw from the distribution first: `x ~ d`, then calculate with `x`")
+            fault.with_hint("draw from the distribution first: `x ~ d`, then compute with `x`")
         }
         _ => fault,
     }

@@ -10,7 +10,15 @@ use smallvec::smallvec;
 const SECTION: &str = "Sums and statistics";
 
 const XS: &[Arg] = &[arg("xs", Type::Array, "Numbers; bools count 0 and 1.")];
-const PAIR: &[Arg] = &[arg("xs", Type::Array, "Numbers."), arg("ys", Type::Array, "As many numbers.")];
+const PAIR: &[Arg] = &[
+    arg("xs", Type::Array, "Numbers."),
+    arg(
+        "ys",
+        Type::Array,
+        "The same \
+    number of numbers.",
+    ),
+];
 
 /// The row of a function of at least so many numbers.
 macro_rules! of_all {
@@ -24,8 +32,8 @@ macro_rules! of_all {
 }
 
 pub(super) const TABLE: &[Row] = &[
-    of_all!("sum", 0, "The sum; 0 of nothing.", sum, |_, _, by| by.fill(1.0)),
-    of_all!("prod", 0, "The product; 1 of nothing.", |xs| xs.iter().product(), |xs, _, by| {
+    of_all!("sum", 0, "The sum; 0 if empty.", sum, |_, _, by| by.fill(1.0)),
+    of_all!("prod", 0, "The product; 1 if empty.", |xs| xs.iter().product(), |xs, _, by| {
         let others = |i: usize| xs.iter().enumerate().filter(|(j, _)| *j != i).map(|(_, x)| x).product();
         by.iter_mut().enumerate().for_each(|(i, by)| *by = others(i));
     }),
@@ -40,14 +48,14 @@ pub(super) const TABLE: &[Row] = &[
         |xs| variance(xs).sqrt(),
         |xs, y, by| spread_slopes(xs, 1.0 / y, by)
     ),
-    of_all!("norm", 0, "The Euclidean length.", norm, |xs, y, by| {
+    of_all!("norm", 0, "The Euclidean norm.", norm, |xs, y, by| {
         by.iter_mut().zip(xs).for_each(|(by, x)| *by = x / y)
     }),
-    of_all!("log_sum_exp", 0, "`log(sum(exp(xs)))` without overflow; -inf of nothing.", log_sum_exp, |xs, y, by| by
+    of_all!("log_sum_exp", 0, "`log(sum(exp(xs)))` without overflow; -inf if empty.", log_sum_exp, |xs, y, by| by
         .iter_mut()
         .zip(xs)
         .for_each(|(by, x)| *by = libm::exp(x - y))),
-    function("cumsum", SECTION, XS, Type::Array, "The running sums.", |a| {
+    function("cumsum", SECTION, XS, Type::Array, "The cumulative sums.", |a| {
         let mut total = 0.0;
         let running = |x: &f64| {
             total += x;
@@ -62,9 +70,15 @@ pub(super) const TABLE: &[Row] = &[
         }
         Some(smallvec![Adjoint::Array(g)])
     }),
-    function("dot", SECTION, PAIR, Type::Num, "The sum of the products of corresponding elements.", |a| {
-        a.number_pair(0, 1).map(|(xs, ys)| Value::Num(dot(&xs, &ys)))
-    })
+    function(
+        "dot",
+        SECTION,
+        PAIR,
+        Type::Num,
+        "The dot product: the sum of the products of \
+        corresponding elements.",
+        |a| a.number_pair(0, 1).map(|(xs, ys)| Value::Num(dot(&xs, &ys))),
+    )
     .pull(|a, _, by| {
         let (xs, ys) = a.number_pair(0, 1).ok()?;
         let along = |v: &[f64]| Adjoint::Array(v.iter().map(|x| times(by.number(), *x)).collect());

@@ -173,7 +173,7 @@ impl Lowerer<'_> {
                             format!("{}: `{}` must be {}, got {}", b.full_name(), arg.name, shown(arg.ty), shown(v.ty));
                         let e = self.error(message, args[*j].value.span, format!("this is {}", shown(v.ty)));
                         if v.ty == Type::Dist {
-                            e.hint_also("draw from it first: x ~ …; then use x");
+                            e.hint_also("draw a value first: x ~ …; then use x");
                         } else {
                             e.hint_also(b.signature());
                         }
@@ -218,7 +218,7 @@ impl Lowerer<'_> {
             };
             let value = l.expr(e);
             if !accepts(Type::Function, value.ty) {
-                let message = format!("`{}` takes a function first, got {}", b.name, shown(value.ty));
+                let message = format!("the first argument of `{}` must be a function, got {}", b.name, shown(value.ty));
                 l.error(message, e.span, format!("this is {}", shown(value.ty))).hint_also(b.signature());
             }
             (value, label)
@@ -266,7 +266,7 @@ impl Lowerer<'_> {
             match (p, keyword) {
                 (Some(p), _) if !given[p] => given[p] = true,
                 (Some(p), _) => {
-                    self.error(format!("`{name}` gets its argument `{}` twice", params[p]), *at, "given again here");
+                    self.error(format!("`{name}` got its argument `{}` twice", params[p]), *at, "given again here");
                     return;
                 }
                 (None, Some(k)) => {

@@ -118,7 +118,7 @@ impl Lowerer<'_> {
         let scope = &mut self.scopes[last];
         if scope.drawn.iter().any(|(n, w, _)| *n == name.node && *w == written) {
             self.error(format!("`{}{written}` is drawn twice", name.node), target.span, "a second draw at one address")
-                .hint_also("every choice needs an address of its own: another key, or another name");
+                .hint_also("every choice needs its own address: use another key, or another name");
             return;
         }
         scope.drawn.push((name.node, written, slot));
@@ -178,10 +178,10 @@ impl Lowerer<'_> {
     }
 
     fn not_a_container(&mut self, name: &Name, bound: Span) {
-        let message = format!("`{}` is a name already and cannot hold keyed choices too", name.node);
-        let e = self.error(message, name.span, "drawn into as a container");
+        let message = format!("`{}` is already bound and cannot also hold keyed choices", name.node);
+        let e = self.error(message, name.span, "used as a container here");
         e.point_at(bound, "bound here");
-        e.hint_also("call the container something else");
+        e.hint_also("give the container another name");
     }
 
     /// The slot that an element was drawn into, if `base[keys]` is written exactly as where it was drawn, in this pass.

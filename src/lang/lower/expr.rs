@@ -20,7 +20,7 @@ impl Lowerer<'_> {
             ExprKind::Bool(b) => self.constant(Value::Bool(*b)),
             ExprKind::Var(name) => self.variable(name, e.span),
             ExprKind::Address(_) | ExprKind::TagSel { .. } => {
-                self.error("a selection of choices is no value of the model", e.span, "a selection")
+                self.error("a selection of choices is not a value of the model", e.span, "a selection")
                     .hint_also("selections belong in inference blocks, `freeze` and `force`");
                 self.nothing()
             }
@@ -124,7 +124,7 @@ impl Lowerer<'_> {
         let mut values = Vec::with_capacity(fields.len());
         for (name, e) in fields {
             if names.contains(&name.node) {
-                self.error(format!("the field `{}` is given twice", name.node), name.span, "again here");
+                self.error(format!("the field `{}` occurs twice", name.node), name.span, "again here");
             }
             names.push(Arc::clone(&name.node));
             values.push(self.expr(e).at);
@@ -167,7 +167,7 @@ impl Lowerer<'_> {
             if matches!(value.ty, Type::Array | Type::Nums)
                 && matches!(key.ty, Type::Bool | Type::Str | Type::Record | Type::Dist | Type::Function)
             {
-                let message = format!("an array is indexed by a whole number, got {}", shown(key.ty));
+                let message = format!("an array index must be a whole number, got {}", shown(key.ty));
                 self.error(message, k.span, format!("this is {}", shown(key.ty)));
                 return self.nothing();
             }
@@ -191,7 +191,10 @@ impl Lowerer<'_> {
             let message = format!("{} has no field `{}`", shown(value.ty), field.node);
             let e = self.error(message, base.span, format!("this is {}", shown(value.ty)));
             match value.ty {
-                Type::Array => e.hint_also("elements of an array are taken by number: a[0], a[1], …"),
+                Type::Array => e.hint_also(
+                    "elements of an array are indexed by number: a[0], \
+                    a[1], …",
+                ),
                 Type::Function => e.hint_also(format!("call it first: f(…).{}", field.node)),
                 _ => {}
             }
@@ -231,11 +234,11 @@ impl Lowerer<'_> {
         match op {
             BinaryOp::And | BinaryOp::Or => {
                 let cond = self.expr(left);
-                self.check_bool(cond, left.span, "`and` and `or` need bools");
+                self.check_bool(cond, left.span, "the operands of `and` and `or` must be bools");
                 let settled = self.constant(Value::Bool(op == BinaryOp::Or)).at;
                 let other = self.branch(|l| {
                     let v = l.expr(right);
-                    l.check_bool(v, right.span, "`and` and `or` need bools");
+                    l.check_bool(v, right.span, "the operands of `and` and `or` must be bools");
                     Some(v)
                 });
                 let fixed = self.branch(|_| Some(Typed { at: settled, ty: Type::Bool }));
@@ -270,7 +273,7 @@ impl Lowerer<'_> {
             let message = format!("`{shown_op}` needs {wanted}, got {}", shown(v.ty));
             let e = self.error(message, *at, format!("this is {}", shown(v.ty)));
             match v.ty {
-                Type::Dist => e.hint_also("draw from it first: x ~ …; then use x"),
+                Type::Dist => e.hint_also("draw a value first: x ~ …; then use x"),
                 Type::Function => e.hint_also("call it: f(…)"),
                 Type::Num | Type::Int if name == "not" => e.hint_also("compare it, e.g. x == 0"),
                 _ => {}
@@ -301,7 +304,7 @@ impl Lowerer<'_> {
 
     fn if_else(&mut self, cond: &Expr, then: &Body, otherwise: &Body) -> Typed {
         let c = self.expr(cond);
-        self.check_bool(c, cond.span, "`if` needs a bool");
+        self.check_bool(c, cond.span, "the condition of `if` must be a bool");
         let a = self.branch(|l| l.body_of(then));
         let b = self.branch(|l| l.body_of(otherwise));
         let ty = if a.1 == b.1 { a.1 } else { Type::Any };

@@ -60,22 +60,22 @@ impl Lowerer<'_> {
         let lives = builtins.iter().find(|b| b.name == name && !b.module.is_empty());
         let lives = lives.map(|b| format!("include \"std/{0}.pcad\" as {0}; then write {0}.{name}", b.module));
         let module = builtins.iter().find(|b| b.module == name);
-        let module = module.map(|_| format!("put this on top: include \"std/{name}.pcad\" as {name};"));
+        let module = module.map(|_| format!("add at the top: include \"std/{name}.pcad\" as {name};"));
         let called = ELSEWHERE.iter().find(|(n, _)| *n == name).map(|(_, here)| format!("write `{here}`"));
         let e = self.error(format!("unknown name `{name}`"), span, "not bound here");
         match elsewhere {
             Some(Elsewhere::Later(at)) => {
                 e.point_at(at, "bound later");
-                e.hint_also("statements run from top to bottom: bind it before it is used");
+                e.hint_also("statements run from top to bottom: bind a name before using it");
                 return;
             }
             Some(Elsewhere::Itself(at)) => {
-                e.point_at(at, "bound by this statement, once its value is there");
-                e.hint_also("what calls itself is a function: fn f(k) { … f(k - 1) … }");
+                e.point_at(at, "bound by this statement, after its value is computed");
+                e.hint_also("for recursion, declare a function: fn f(k) { … f(k - 1) … }");
                 return;
             }
             Some(Elsewhere::Inside(at, place)) => {
-                e.point_at(at, &format!("bound inside a {place}, and known only there"));
+                e.point_at(at, &format!("bound inside a {place}, and visible only there"));
                 return;
             }
             None => {}
@@ -127,7 +127,7 @@ impl Lowerer<'_> {
         let known: Vec<&str> = own.iter().map(|n| &**n).chain(natives).collect();
         let hint = match nearest(&field.node, known.iter().copied()) {
             Some(n) => format!("did you mean `{ns}.{n}`?"),
-            None if known.is_empty() => "it has no names at all".into(),
+            None if known.is_empty() => "it has no names".into(),
             None => format!("it has {}", known.join(", ")),
         };
         self.error(format!("`{ns}` has no `{}`", field.node), field.span, "unknown name").hint_also(hint);

@@ -52,10 +52,13 @@ impl Lowerer<'_> {
                             let space = Namespace { module, span: alias.span };
                             let old = self.modules[self.module].namespaces.insert(Arc::clone(&alias.node), space);
                             if let Some(old) = old {
-                                let message = format!("the namespace `{}` is used twice", alias.node);
-                                let e = self.error(message, alias.span, "used again here");
-                                e.point_at(old.span, "first used here");
-                                e.hint_also("give one of them another name after `as`, or include the file once");
+                                let message = format!("the namespace `{}` is declared twice", alias.node);
+                                let e = self.error(message, alias.span, "declared again here");
+                                e.point_at(old.span, "first declared here");
+                                e.hint_also(
+                                    "rename one of them after `as`, or include the file \
+                                    once",
+                                );
                             }
                             let outer = std::mem::replace(&mut self.module, module);
                             self.unit(included);
@@ -77,7 +80,7 @@ impl Lowerer<'_> {
                         let message = format!("the kernel `{}` is declared twice", k.name.node);
                         let e = self.error(message, k.name.span, "declared again here");
                         e.point_at(old.name.span, "first declared here");
-                        e.hint_also("give one of them another name");
+                        e.hint_also("rename one of them");
                     }
                 }
                 // A plan of an included file is that file's own.
@@ -115,10 +118,10 @@ impl Lowerer<'_> {
             match (0..i).rev().find(|j| !gone.contains(j) && is_it(&items[*j])) {
                 Some(j) => gone.push(j),
                 None => {
-                    let message = format!("nothing named `{name}` was observed or assumed before");
+                    let message = format!("no earlier observation or assume is named `{name}`");
                     let names = items[..i].iter().filter_map(forgettable).collect::<Vec<_>>();
                     let near = nearest(&name, names.iter().map(|n| &*n.node)).map(str::to_owned);
-                    let e = self.error(message, e.span, "cannot be forgotten");
+                    let e = self.error(message, e.span, "nothing to forget");
                     match near {
                         Some(n) => e.hint_also(format!("did you mean `{n}`?")),
                         None => e.hint_also("name an observation with `as` to be able to forget it"),
@@ -147,7 +150,7 @@ impl Lowerer<'_> {
         if let Some(p) = lambda.params[required..].iter().find(|p| p.default.is_none()) {
             let message = format!("the parameter `{}` needs a default", p.name.node);
             self.error(message, p.name.span, "comes after one that has a default")
-                .hint_also("put those without a default first");
+                .hint_also("put parameters without a default first");
         }
         self.new_block(BlockKind::Function { name, params, required })
     }
@@ -216,7 +219,7 @@ impl Lowerer<'_> {
             (None, None) => {
                 if self.inputs.needs_data {
                     let e = self.error(format!("the parameter `{name}` has no value"), d.name.span, "no default");
-                    e.hint_also(format!("give it on the command line: --set {name}=…"));
+                    e.hint_also(format!("set it on the command line: --set {name}=…"));
                 }
                 self.nothing()
             }
@@ -290,7 +293,7 @@ impl Lowerer<'_> {
             (None, None) => {
                 if self.inputs.needs_data {
                     let e = self.error(format!("`{name}` is not given"), d.name.span, "needs a file");
-                    e.hint_also(format!("give it on the command line: --observe {name}=FILE"));
+                    e.hint_also(format!("set it on the command line: --observe {name}=FILE"));
                 }
                 self.nothing()
             }
@@ -312,8 +315,8 @@ impl Lowerer<'_> {
                 return self.nothing();
             };
             let ExprKind::Str(path) = &arg.value.kind else {
-                self.error(format!("{kind} takes a path in quotes"), arg.value.span, "not a string")
-                    .hint_also("what a run reads must be known before it starts");
+                self.error(format!("{kind} takes a path, a string in quotes"), arg.value.span, "not a string")
+                    .hint_also("the files of a run must be known before it starts");
                 return self.nothing();
             };
             let Some(options) = self.options(kind, rest) else { return self.nothing() };
@@ -365,7 +368,7 @@ impl Lowerer<'_> {
             );
             self.errors.push(match (nearest(&name, known.iter().copied()), known.is_empty()) {
                 (Some(n), _) => d.hint(format!("did you mean `{n}`?")),
-                (None, true) => d.hint(format!("it has no {what}s at all")),
+                (None, true) => d.hint(format!("it has no {what}s")),
                 (None, false) => d.hint(format!("it has {}", known.join(", "))),
             });
         }

@@ -55,8 +55,12 @@ impl Lowerer<'_> {
         match &s.kind {
             KStmtKind::Warmup { count, body } => {
                 if around.in_loop || around.in_kernel {
-                    self.error("`warmup` stands at the top of an inference block", s.span, "inside a loop or kernel")
-                        .hint_also("infer { warmup 1000 { … } repeat 1000 { … collect x; } }");
+                    self.error(
+                        "`warmup` is allowed only at the top level of an inference block",
+                        s.span,
+                        "inside a loop or kernel",
+                    )
+                    .hint_also("infer { warmup 1000 { … } repeat 1000 { … collect x; } }");
                 }
                 self.count(count, around);
                 let mut inner = Around { in_loop: true, in_warmup: true, ..around.clone() };
@@ -64,7 +68,7 @@ impl Lowerer<'_> {
             }
             KStmtKind::Repeat { count, body } | KStmtKind::Every { count, body } => {
                 if matches!(s.kind, KStmtKind::Every { .. }) && !around.in_loop {
-                    self.error("`every` belongs in a loop", s.span, "no loop around it")
+                    self.error("`every` is allowed only in a loop", s.span, "not in a loop")
                         .hint_also("repeat 1000 { … every 10 { … } }");
                 }
                 self.count(count, around);
@@ -86,21 +90,26 @@ impl Lowerer<'_> {
             }
             KStmtKind::StopWhen(e) => {
                 if !around.in_loop {
-                    self.error("`stop when` belongs in a loop, which it ends", s.span, "no loop around it")
-                        .hint_also("repeat 1000 { … stop when …; }");
+                    self.error(
+                        "`stop when` is allowed only in a loop, which it ends",
+                        s.span,
+                        "not \
+                        in a loop",
+                    )
+                    .hint_also("repeat 1000 { … stop when …; }");
                 }
                 self.plan_expr(e, around);
             }
             KStmtKind::Collect(exprs) => {
                 if around.in_warmup {
-                    self.error("draws of a warm-up are discarded", s.span, "nothing is collected here")
+                    self.error("draws in warm-up are discarded", s.span, "cannot collect here")
                         .hint_also("put `collect` into the `repeat` that follows");
                 }
                 for e in exprs {
                     if let ExprKind::Var(v) = &e.kind
                         && around.names.contains(v)
                     {
-                        self.error(format!("`{v}` is no quantity of the model"), e.span, "a variable of this block");
+                        self.error(format!("`{v}` is not a quantity of the model"), e.span, "a variable of this block");
                         continue;
                     }
                     self.query(e);
@@ -108,7 +117,7 @@ impl Lowerer<'_> {
             }
             KStmtKind::Propose { target, dist } => {
                 if !around.in_kernel {
-                    self.error("`propose` belongs in a kernel", s.span, "outside of one")
+                    self.error("`propose` is allowed only in a kernel", s.span, "outside a kernel")
                         .hint_also("kernel name(…) { … propose @x ~ d; … }");
                 }
                 self.plan_expr(dist, around);
@@ -122,7 +131,7 @@ impl Lowerer<'_> {
             }
             KStmtKind::Map { target, value } => {
                 if !around.in_kernel {
-                    self.error("`propose` belongs in a kernel", s.span, "outside of one")
+                    self.error("`propose` is allowed only in a kernel", s.span, "outside a kernel")
                         .hint_also("kernel name(…) { … propose @x = e; … }");
                 }
                 self.selection(target, &around.names.clone());
@@ -147,7 +156,7 @@ impl Lowerer<'_> {
                     _ => Type::Record,
                 };
                 let label = format!("this is {}", shown(got));
-                self.error(format!("a number was expected, got {}", shown(got)), e.span, label);
+                self.error(format!("expected a number, got {}", shown(got)), e.span, label);
             }
             _ => self.plan_expr(e, around),
         }
@@ -156,12 +165,12 @@ impl Lowerer<'_> {
     /// A kernel applied to a selection.
     fn kernel(&mut self, e: &Expr, around: &Around) {
         let ExprKind::Call { callee, args } = &e.kind else {
-            self.error("a kernel was expected", e.span, "not a call of a kernel")
+            self.error("expected a kernel", e.span, "not a call of a kernel")
                 .hint_also("for example mh(one(@**)); or drift($tag);");
             return;
         };
         let ExprKind::Var(name) = &callee.kind else {
-            self.error("a kernel was expected", callee.span, "not the name of a kernel");
+            self.error("expected a kernel", callee.span, "not the name of a kernel");
             return;
         };
         if let Some(k) = self.kernels.get(name).cloned() {
@@ -184,16 +193,28 @@ impl Lowerer<'_> {
         match table.find("", name).map(|i| table.get(i)) {
             Some(b) if matches!(b.kind, Kind::Inference) => {
                 if b.returns != Type::Kernel {
-                    self.error(format!("`{name}` is no kernel"), callee.span, format!("it gives {}", shown(b.returns)));
+                    self.error(
+                        format!("`{name}` is not a kernel"),
+                        callee.span,
+                        format!(
+                            "it \
+                        returns {}",
+                            shown(b.returns)
+                        ),
+                    );
                     return;
                 }
                 if &**name == "init" && around.in_loop {
-                    self.error("`init` stands at the top of an inference block", e.span, "inside a loop")
-                        .hint_also("infer { init(best_of(100)); repeat 1000 { … } }");
+                    self.error(
+                        "`init` is allowed only at the top level of an inference block",
+                        e.span,
+                        "inside a loop",
+                    )
+                    .hint_also("infer { init(best_of(100)); repeat 1000 { … } }");
                 }
                 if &**name == "anneal" && !around.in_warmup {
-                    self.error("`anneal` belongs in a `warmup`", e.span, "draws are kept here")
-                        .hint_also("the likelihood must be itself when draws are collected");
+                    self.error("`anneal` is allowed only in `warmup`", e.span, "draws are kept here")
+                        .hint_also("draws must be collected under the unmodified likelihood");
                 }
                 self.inference_args(b, args, e.span, around);
             }
@@ -210,7 +231,7 @@ impl Lowerer<'_> {
                 let own: Vec<Arc<str>> = self.kernels.keys().cloned().collect();
                 let near = crate::diag::nearest(name, known.chain(own.iter().map(|n| &**n))).map(str::to_owned);
                 let message = match other {
-                    Some(what) => format!("a kernel was expected, `{name}` is {what}"),
+                    Some(what) => format!("expected a kernel, but `{name}` is {what}"),
                     None => format!("unknown kernel `{name}`"),
                 };
                 let e = self.error(message, callee.span, "not a kernel");
@@ -277,7 +298,7 @@ impl Lowerer<'_> {
             }
             _ => {
                 self.error("`init` takes prior() or best_of(n)", e.span, "not a start")
-                    .hint_also("init(best_of(100)); starts from the best of 100 draws from the prior");
+                    .hint_also("init(best_of(100)); starts at the best of 100 draws from the prior");
             }
         }
     }
@@ -342,7 +363,7 @@ impl Lowerer<'_> {
 
     fn not_in_a_plan(&mut self, span: Span) {
         self.error("this expression cannot be used in an inference block", span, "a function, or statements")
-            .hint_also("bind it outside: let name = …; of the program, and use the name here");
+            .hint_also("bind it in the model, let name = …;, and use the name here");
     }
 
     /// An expression of the model that draws are made of: a slot of the top level.

@@ -134,7 +134,7 @@ impl Lowerer<'_> {
         if let Some(old) = names.insert(Arc::clone(&name.node), binding) {
             let e = self.error(format!("`{}` is bound twice", name.node), name.span, "bound again here");
             e.point_at(old.span, "first bound here");
-            e.hint_also("give one of them another name");
+            e.hint_also("rename one of them");
         }
     }
 

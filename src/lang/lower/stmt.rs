@@ -44,7 +44,7 @@ impl Lowerer<'_> {
                     let global = self.global_name(name);
                     self.code.predictions.push((global, value.at));
                 } else {
-                    self.error("`predict` belongs to the top level", s.span, "inside a function or loop")
+                    self.error("`predict` is allowed only at the top level", s.span, "inside a function or loop")
                         .hint_also("return the value and predict the result of the call");
                 }
             }
@@ -86,7 +86,7 @@ impl Lowerer<'_> {
                 let value = self.expr(value);
                 match &target.kind {
                     _ if !at_root => {
-                        self.error("`force` belongs to the top level", s.span, "inside a function or loop");
+                        self.error("`force` is allowed only at the top level", s.span, "inside a function or loop");
                     }
                     ExprKind::Address(a) => {
                         self.code.forces.push(Force { target: a.clone(), value: value.at, span: target.span });
@@ -101,11 +101,11 @@ impl Lowerer<'_> {
                 if at_root {
                     self.code.freezes.push(sel.clone());
                 } else {
-                    self.error("`freeze` belongs to the top level", s.span, "inside a function or loop");
+                    self.error("`freeze` is allowed only at the top level", s.span, "inside a function or loop");
                 }
             }
             StmtKind::Forget(_) => {
-                self.error("`forget` belongs to the top level", s.span, "inside a function or loop");
+                self.error("`forget` is allowed only at the top level", s.span, "inside a function or loop");
             }
             StmtKind::Sample(e) => {
                 let label: Arc<str> = Arc::from("sample");
@@ -113,7 +113,7 @@ impl Lowerer<'_> {
                 if at_root {
                     self.code.samples.push(value.at);
                 } else {
-                    self.error("`sample` belongs to the top level", s.span, "inside a function or loop");
+                    self.error("`sample` is allowed only at the top level", s.span, "inside a function or loop");
                 }
             }
             StmtKind::For { var, iter, body } => self.for_loop(var, iter, body, s),
@@ -133,7 +133,7 @@ impl Lowerer<'_> {
     fn for_loop(&mut self, var: &Name, iter: &Expr, body: &[Stmt], s: &Stmt) {
         let over = self.expr(iter);
         if !matches!(over.ty, Type::Any | Type::Array | Type::Nums | Type::Record) {
-            let message = format!("`for` runs over an array, a range or a record, not over {}", shown(over.ty));
+            let message = format!("`for` iterates over an array, a range or a record, not over {}", shown(over.ty));
             let e = self.error(message, iter.span, format!("this is {}", shown(over.ty)));
             if matches!(over.ty, Type::Num | Type::Int) {
                 e.hint_also("a range of whole numbers is written 0 .. n");
@@ -178,12 +178,12 @@ impl Lowerer<'_> {
             Type::Any | Type::Dist => {}
             Type::Likelihood => {
                 self.error("a likelihood cannot be drawn from", e.span, "this is a likelihood")
-                    .hint_also("it scores a value against the scene and has no sampler: use it in `observe`");
+                    .hint_also("it scores an observed value and has no sampler: use it in `observe`");
             }
             ty => {
                 let message = format!("`~` needs a distribution, got {}", shown(ty));
                 self.error(message, e.span, format!("this is {}", shown(ty)))
-                    .hint_also("a value is bound by `=`: `let x = …;` or `assume x = …;`");
+                    .hint_also("use `=` to bind a value: `let x = …;` or `assume x = …;`");
             }
         }
     }

@@ -56,12 +56,14 @@ fn operators_that_do_not_fit_are_named() {
             all[t][0] = Field::I32s(shape.to_vec());
         }
     };
-    assert!(with(&tensors(0, &[1, 1, 4, 1])).contains("operator 1 of the network, builtin 3: its tensors"));
+    assert!(
+        with(&tensors(0, &[1, 1, 4, 1])).contains("operator 1 of the network, builtin 3: the shapes of its tensors")
+    );
     assert!(with(&tensors(5, &[1, 1, 3, 1])).contains("operator 2 of the network, builtin 19"));
-    assert!(with(&tensors(3, &[2])).contains("another number of values"));
+    assert!(with(&tensors(3, &[2])).contains("the number of values of a constant"));
     assert!(with(&tensors(0, &[1, 1 << 20, 1 << 20, 1])).contains("too large"));
     assert!(with(&|g| g[2] = Field::I32s(vec![3])).contains("an output is never computed"));
-    assert!(with(&|g| g[1] = Field::I32s(vec![9])).contains("a tensor is not there"));
+    assert!(with(&|g| g[1] = Field::I32s(vec![9])).contains("a tensor is missing"));
 }
 
 /// The dense form of a tensor of these values, with dimensions of a table `DimensionMetadata` each.

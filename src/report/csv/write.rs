@@ -97,7 +97,7 @@ impl<W: Write + Send> Sink for CsvSink<W> {
 
     fn draw(&mut self, row: &DrawRow) -> io::Result<()> {
         if self.width != Some(row.values.len()) {
-            let said = self.width.map_or("none announced".into(), |w| format!("{w} announced"));
+            let said = self.width.map_or("no columns declared".into(), |w| format!("{w} announced"));
             let message = format!("a draw of {} numbers with {said}", row.values.len());
             return Err(io::Error::new(io::ErrorKind::InvalidInput, message));
         }

@@ -19,10 +19,13 @@ impl Rules<'_, '_> {
             Token::Semi => self.semicolon(),
             Token::Hash => self.hash(),
             Token::Str(_) => self.string(),
-            Token::Arrow => hint("a function is written `fn(x) { … }`; `weight => kernel;` stands in `mix { … }`"),
-            Token::Plus if self.expects_expression() => hint("there is no `+` before a single value"),
+            Token::Arrow => hint(
+                "a function is written `fn(x) { … }`; `weight => kernel;` is \
+                                  used only in `mix { … }`",
+            ),
+            Token::Plus if self.expects_expression() => hint("there is no unary `+`"),
             Token::Range if !self.expects_expression() => hint("`..` does not chain, and `a .. b` has no step"),
-            Token::In if self.expects_operator() => hint("`in` stands in `for x in xs { … }` only"),
+            Token::In if self.expects_operator() => hint("`in` is used only in `for x in xs { … }`"),
             token if token.is_comparison() && !self.expects_expression() && !self.expects("=") => {
                 say("comparisons do not chain", "", "write `a < b and b < c`")
             }
@@ -30,7 +33,7 @@ impl Rules<'_, '_> {
                 hint("a type follows a colon: `data photo: image;`")
             }
             Token::Name(_) if self.expects("a string") && !self.expects_expression() => {
-                hint("it is written in quotes: \"…\"")
+                hint("write it in quotes: \"…\"")
             }
             _ => None,
         }
@@ -51,7 +54,10 @@ impl Rules<'_, '_> {
                 let others = "`x[k] ~ d;` makes a random choice; an array is made by `map(f, xs)`";
                 say("values do not change", "", format!("{others}; {}", recurrence(name)))
             }
-            Token::Fn if self.expects_block() => hint("the body of a function is in braces: `fn f(x) { x + 1 }`"),
+            Token::Fn if self.expects_block() => hint(
+                "write the body of a function in braces: \
+                `fn f(x) { x + 1 }`",
+            ),
             _ if self.expects_name_only() => None,
             _ => say("`=` does not compare", "write `==`", "`a == b` compares; `let x = e;` binds one name"),
         }
@@ -79,7 +85,7 @@ impl Rules<'_, '_> {
     fn colon(&self) -> Option<Advice> {
         let same_line = !first_on_line(self.context.tokens.text, &self.context.tokens.lexemes, self.context.at + 1);
         if self.first() == Some(&Token::Let) && self.distance() == 2 {
-            return hint("`let` declares no type: write `let x = e;`");
+            return hint("`let` has no type annotation: write `let x = e;`");
         }
         if matches!(self.back(2), Some(Token::LBrace | Token::Comma)) && matches!(self.back(1), Some(Token::Str(_))) {
             return hint("the keys of a record are names, without quotes: `{ x: 1 }`");
@@ -116,7 +122,7 @@ impl Rules<'_, '_> {
             _ if self.expects("else") && !self.expects("a name") => say(
                 "an `if` with a value needs an `else`",
                 "expected `else { … }`",
-                "say what the value is otherwise: `if c { a } else { b }`",
+                "give the value for the other case: `if c { a } else { b }`",
             ),
             _ if self.expects("=>") => say("a kernel without a weight", "expected `=>`", "write `0.5 => kernel;`"),
             _ => None,
@@ -127,7 +133,7 @@ impl Rules<'_, '_> {
         if self.distance() == 0 || self.expects_statement() {
             return hint("a comment begins with `//`; `#` marks a random choice with a tag: `x ~ d #tag;`");
         }
-        hint("a tag stands at the end of a random choice, `x ~ d #tag;`; a comment begins with `//`")
+        hint("a tag goes at the end of a random choice, `x ~ d #tag;`; a comment begins with `//`")
     }
 
     fn string(&self) -> Option<Advice> {
@@ -138,7 +144,7 @@ impl Rules<'_, '_> {
             return say("a `param` without a default", "expected `=`", "write `param n = 10 \"help\";`");
         }
         if self.expects_name_only() {
-            return hint("a name is written without quotes");
+            return hint("write the name without quotes");
         }
         None
     }
@@ -151,7 +157,7 @@ impl Rules<'_, '_> {
             }
             (Some(Token::Number(_)), Some(Token::Dot), _, _) => {
                 let number = self.text(self.context.at.saturating_sub(2));
-                hint(format!("a number does not end with a point: write `{number}.0`"))
+                hint(format!("a number cannot end with a decimal point: write `{number}.0`"))
             }
             (_, Some(Token::Dot), Token::Number(_), _) => hint("an element is written `x[0]`, a field `x.name`"),
             (_, Some(Token::Number(_)), Token::Name(_), _) if !self.expects_expression() && !self.expects(",") => {
@@ -179,7 +185,8 @@ impl Rules<'_, '_> {
             && self.back(2) == Some(&Token::LBrace)
             && self.expects(":")
         {
-            let advice = say(format!("`{word}` without a number"), "how often?", format!("write `{word} 100 {{ … }}`"));
+            let advice =
+                say(format!("`{word}` without a count"), "how many times?", format!("write `{word} 100 {{ … }}`"));
             return advice.map(|advice| Advice { place: Some(self.context.at - 3), ..advice });
         }
         match self.first()? {
@@ -208,8 +215,11 @@ impl Rules<'_, '_> {
         let found = self.found()?;
         if *found == Token::Comma && !self.expects_expression() {
             return match self.first()? {
-                Token::Let | Token::Assume | Token::Predict => hint("each name is bound by a statement of its own"),
-                Token::Name(_) => hint("each random choice is made by a statement of its own"),
+                Token::Let | Token::Assume | Token::Predict => hint(
+                    "each name needs its own \
+                    statement",
+                ),
+                Token::Name(_) => hint("each random choice needs its own statement"),
                 _ => None,
             };
         }

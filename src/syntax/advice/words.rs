@@ -29,7 +29,7 @@ impl Rules<'_, '_> {
                 "another file is read by `include \"file.pcad\" as name;`"
             }
             "model" | "parameters" | "transformed" | "generated" | "program" | "module" | "begin" if block => {
-                "the statements of a model stand at the top level, one after the other"
+                "the statements of a model are written at the top level, one after another"
             }
             "while" | "loop" | "do" | "until" => "write `for i in a .. b { … }`, or a function that calls itself",
             "elif" | "elseif" | "elsif" => "write `else if`",
@@ -37,11 +37,11 @@ impl Rules<'_, '_> {
             "class" | "struct" | "type" | "enum" if named => "a record is written `{ x: 1, y: 2 }`",
             "print" | "echo" | "show" => "write `report e;`",
             "query" | "condition" | "constrain" => {
-                "data are observed by `observe d = v;`, a soft constraint is added by `factor(logw);`"
+                "`observe d = v;` observes data, `factor(logw);` adds a soft constraint"
             }
-            "del" | "delete" => "an observation is removed by `forget name;`",
+            "del" | "delete" => "`forget name;` removes an observation",
             "global" | "local" | "static" | "public" | "private" => {
-                "a name is known where it is bound, and in what follows"
+                "a name is visible after the statement that binds it"
             }
             _ => return None,
         };
@@ -57,7 +57,7 @@ impl Rules<'_, '_> {
             let semicolon =
                 matches!(self.back(1), Some(Token::Semi | Token::Bad)) && self.back(2) == Some(&Token::RBrace);
             let hint = if semicolon {
-                "no `;` stands between `}` and `else`"
+                "there is no `;` between `}` and `else`"
             } else {
                 "write `if c { … } else { … }`, with both branches in braces"
             };
@@ -65,15 +65,20 @@ impl Rules<'_, '_> {
         }
         if self.expects_statement() {
             if found.starts_inference_statement() {
-                let message = format!("`{word}` belongs in an inference plan");
+                let message = format!("`{word}` is allowed only in an inference plan");
                 return say(message, "not a statement of the model", format!("write `infer {{ {word} … }}`"));
             }
             if found.starts_model_statement() {
-                let message = format!("`{word}` belongs in the model");
-                return say(message, "not a statement of an inference plan", "put it outside of `infer` or `kernel`");
+                let message = format!("`{word}` is allowed only in the model");
+                return say(message, "not a statement of an inference plan", "move it outside `infer` or `kernel`");
             }
             if found.starts_item() && *found != Token::Fn {
-                return say(format!("`{word}` stands at the top level only"), "this is inside a block", "move it out");
+                return say(
+                    format!("`{word}` is allowed only at the top level"),
+                    "this is inside a block",
+                    "move \
+                    it out of the block",
+                );
             }
         }
         if self.back(1) == Some(&Token::Fn) && matches!(found, Token::Name(_)) {
@@ -81,7 +86,7 @@ impl Rules<'_, '_> {
             return say("a named function cannot be declared here", "expected `(`", hint);
         }
         if (found.starts_statement() || found.starts_item()) && self.expects_expression() && !self.expects(word) {
-            let advice = say("this statement is not finished", "expected an expression after this", "");
+            let advice = say("this statement is incomplete", "expected an expression after this", "");
             return advice.map(|advice| Advice { hint: None, place: self.context.at.checked_sub(1), ..advice });
         }
         if matches!(found, Token::If | Token::Fn | Token::Not) && self.expects_expression() && !self.expects(word) {

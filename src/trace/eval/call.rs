@@ -267,7 +267,7 @@ impl Graph {
         let closure = match self.value(code, frame, f) {
             Value::Closure(c) => *c,
             v => {
-                let message = format!("mem: needs a function of your own, got {}", v.type_name());
+                let message = format!("mem: needs a function defined in the program, got {}", v.type_name());
                 return Err(self.type_error(code, n, message));
             }
         };
@@ -357,7 +357,7 @@ impl Graph {
         args: &WrittenArgs,
     ) -> Result<FrameId, Failure> {
         let Some(Side::Memo(m)) = self.nodes[memo as usize].side.as_deref() else {
-            return Err(self.type_error(code, n, "this `mem` function is gone".into()));
+            return Err(self.type_error(code, n, "this `mem` function no longer exists".into()));
         };
         let (block, parent) = (m.block, m.parent);
         let old = m.entries.get(key).copied();
@@ -448,7 +448,7 @@ pub(crate) fn match_names<'a>(
         };
         in_order &= p == i;
         if map[p].replace(i as u16).is_some() {
-            return Err(format!("`{name}` gets its argument `{}` twice", params[p]));
+            return Err(format!("`{name}` got its argument `{}` twice", params[p]));
         }
     }
     if let Some(p) = map[..required].iter().position(Option::is_none) {

@@ -67,7 +67,7 @@ impl Graph {
     }
 
     fn reformed(&self, code: &Code, n: NodeId) -> Failure {
-        let message = "the choice is a number, and its parameters turned into arrays".to_owned();
+        let message = "the choice is a number, but its parameters became arrays".to_owned();
         let hint = "write two choices, one for each: if c { a ~ normal([0, 1], 1); a } else { b ~ normal(0, 1); b }";
         self.fail(code, n, FaultKind::Type, message, Some(hint.into()))
     }
@@ -233,8 +233,9 @@ impl Graph {
     }
 
     fn improper(&self, code: &Code, n: NodeId, dist: &Dist) -> Failure {
-        let message = format!("`{}` is improper: it cannot be drawn from", dist.name());
-        let hint = "use `drift` on it, condition on something that depends on it, or give it a proper prior";
+        let message = format!("`{}` is improper, so it cannot be sampled", dist.name());
+        let hint = "use `drift` on it, observe something that depends on it, or give it a proper \
+                    prior";
         self.fail(code, n, FaultKind::Domain, message, Some(hint.into()))
     }
 

@@ -107,7 +107,15 @@ impl Graph {
                         f = self.nodes[self.frames[f as usize].owner as usize].frame;
                     }
                     let key = self.frames[f as usize].key.clone();
-                    key.ok_or_else(|| self.type_error(code, n, "this pass of the loop has no key".into()))?
+                    key.ok_or_else(|| {
+                        self.type_error(
+                            code,
+                            n,
+                            "this iteration of the loop has no \
+                        key"
+                            .into(),
+                        )
+                    })?
                 }
                 SourceKey::Operand(o) => {
                     if let Some(m) = self.unready(frame, *o) {
@@ -124,7 +132,7 @@ impl Graph {
             let shown = keys.iter().map(|k| format!("[{k}]")).collect::<String>();
             let Op::Container { name, .. } = self.op(code, n) else { return Ok(None) };
             let message = format!("`{name}{shown}` is drawn twice");
-            let hint = "every pass of the loop needs a key of its own".to_owned();
+            let hint = "every iteration of the loop needs its own key".to_owned();
             return Err(self.fail(code, n, FaultKind::Duplicate, message, Some(hint)));
         }
         Ok(None)

@@ -66,7 +66,11 @@ impl Graph {
             }
             v @ (Value::Array(_) | Value::List(_)) => (v.clone(), for_keys(v)),
             v => {
-                let message = format!("`for` runs over an array, a range or a record, not over {}", v.type_name());
+                let message = format!(
+                    "`for` iterates over an array, a range or a record, not \
+                                       over {}",
+                    v.type_name()
+                );
                 return Err(self.type_error(code, n, message));
             }
         };
@@ -157,7 +161,7 @@ impl Graph {
         let (block, parent) = match self.value(code, frame, f) {
             Value::Closure(c) => (c.block, c.frame),
             v => {
-                let message = format!("fold: needs a function of your own, got {}", v.type_name());
+                let message = format!("fold: needs a function defined in the program, got {}", v.type_name());
                 return Err(self.type_error(code, n, message));
             }
         };
@@ -303,7 +307,7 @@ impl Graph {
     /// The frame of a pass, made if nothing has asked for it before.
     pub(crate) fn pass_frame(&mut self, code: &Code, owner: NodeId, pass: usize) -> Result<FrameId, Failure> {
         let Some(Side::Loop(l)) = self.nodes[owner as usize].side.as_deref() else {
-            return Err(self.fail(code, owner, FaultKind::Index, "this loop has no passes".into(), None));
+            return Err(self.fail(code, owner, FaultKind::Index, "this loop has no iterations".into(), None));
         };
         if l.frames[pass] != NONE {
             return Ok(l.frames[pass]);
@@ -379,9 +383,9 @@ fn listed(keys: impl Iterator<Item = Option<Key>>) -> Result<Keys, Fault> {
     let mut list: SmallVec<[Key; 8]> = SmallVec::new();
     let mut index = FxHashMap::default();
     for k in keys {
-        let k = k.ok_or_else(|| Fault::type_error("not a number cannot be a key"))?;
+        let k = k.ok_or_else(|| Fault::type_error("NaN cannot be used as a key"))?;
         if index.insert(k.clone(), list.len() as u32).is_some() {
-            return Err(Fault::new(FaultKind::Duplicate, format!("the key {k} comes twice"))
+            return Err(Fault::new(FaultKind::Duplicate, format!("the key {k} occurs twice"))
                 .with_hint("loop over the indices instead: for i in 0 .. len(xs)"));
         }
         list.push(k);

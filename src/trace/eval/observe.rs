@@ -140,7 +140,7 @@ impl Graph {
         }
         let score = match self.value(code, frame, weight) {
             Value::Num(w) if w.is_nan() => {
-                let hint = "0 / 0, inf - inf and the logarithm of a negative number are none".to_owned();
+                let hint = "0 / 0, inf - inf and the logarithm of a negative number are NaN".to_owned();
                 return Err(self.fail(code, n, FaultKind::Domain, "the log weight is not a number".into(), Some(hint)));
             }
             Value::Num(w) => *w,

@@ -51,7 +51,7 @@ impl Reverse<'_> {
         let frame = g.nodes[n as usize].frame;
         let Op::Map { f, over, .. } = g.op(self.code, n) else { return Ok(()) };
         let Value::Builtin(i) = g.value(self.code, frame, *f) else {
-            return Err(self.no_derivative(n, "what this map gives"));
+            return Err(self.no_derivative(n, "the result of this map"));
         };
         let builtin = self.code.builtins.get(*i);
         let (xs, ys) = (g.plain(self.code, frame, *over, &mut Deps::new()), &g.nodes[n as usize].value);
@@ -110,7 +110,14 @@ impl Reverse<'_> {
             }
             if part.is_unknown() {
                 let name = builtin.args.get(i).or(builtin.args.last()).map_or("", |a| &*a.name);
-                return Err(self.no_derivative(n, &format!("`{}` by its argument `{name}`", builtin.full_name())));
+                return Err(self.no_derivative(
+                    n,
+                    &format!(
+                        "`{}`, as a function of its argument \
+                    `{name}`,",
+                        builtin.full_name()
+                    ),
+                ));
             }
             self.give_node(source, part);
         }

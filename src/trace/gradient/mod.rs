@@ -96,7 +96,7 @@ impl Graph {
             // A likelihood may leave out some of its arguments: that matters if these depend on a target.
             let in_parts = matches!((&self.nodes[n as usize].value, &by), (Value::Likelihood(_), Adjoint::List(_)));
             if by.is_unknown() && !in_parts {
-                return Err(pass.no_derivative(n, "what is made of this"));
+                return Err(pass.no_derivative(n, "a value computed from this"));
             }
             if let Some(place) = own.get_mut(&n) {
                 pass.pull_support(n, targets, &by)?;
@@ -253,8 +253,8 @@ impl<'a> Reverse<'a> {
             self.code,
             n,
             FaultKind::Type,
-            format!("{of} depends on a selected choice, and its derivative is not known"),
-            Some("leave that choice to a kernel without gradients, such as drift".into()),
+            format!("{of} depends on a selected choice, but its derivative is not available"),
+            Some("use a kernel without gradients for that choice, such as drift".into()),
         )
     }
 }

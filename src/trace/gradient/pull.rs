@@ -111,7 +111,7 @@ impl Reverse<'_> {
             Op::Call { .. } if self.pull_called(n, by)? => {}
             Op::Accumulator | Op::Call { .. } | Op::If { .. } | Op::Fold { .. } => match &self.inputs(n, false)[..] {
                 [one] => self.give_node(*one, by.clone()),
-                _ => return Err(self.no_derivative(n, "what this call gives")),
+                _ => return Err(self.no_derivative(n, "the result of this call")),
             },
             Op::Select { .. } => {
                 if let Some(o) = self.taken(n) {
@@ -195,7 +195,13 @@ impl Reverse<'_> {
         if !matches!(self.graph.nodes[n as usize].side.as_deref(), Some(Side::Deps(_))) {
             return Ok(());
         }
-        let Some(elements) = self.gathered(n) else { return Err(self.no_derivative(n, "what this map gives")) };
+        let Some(elements) = self.gathered(n) else {
+            return Err(self.no_derivative(
+                n,
+                "the result \
+            of this map",
+            ));
+        };
         for (i, d) in elements.into_iter().enumerate() {
             let part = match &self.graph.nodes[n as usize].value {
                 Value::Record(r) => r.get_index(i).map_or(Adjoint::Zero, |(name, _)| by.field(name)),

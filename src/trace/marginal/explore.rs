@@ -142,7 +142,10 @@ impl Trace {
         loop {
             let joins = m.partition.joins();
             let mut table = Table::new(m, &m.partition).map_err(|i| {
-                let what = format!("it and others depend on each other, with more than {MOST_VALUES} joint values");
+                let what = format!(
+                    "it is coupled with other choices, and together they have more \
+                                    than {MOST_VALUES} joint values"
+                );
                 self.cannot_sum(m.sites[i], &what)
             })?;
             let (mut found, mut asked) = (Found::default(), Asked::default());
@@ -167,7 +170,13 @@ impl Trace {
                 }
                 match self.moved_support(m) {
                     Some(_) if !at.is_empty() => return Ok(Explored::Nowhere),
-                    Some(t) => return Err(self.cannot_sum(t, "what values there are depends on other choices")),
+                    Some(t) => {
+                        return Err(self.cannot_sum(
+                            t,
+                            "its possible values depend on other \
+                        choices",
+                        ));
+                    }
                     None => {}
                 }
                 let mut reader = Reader::new(&self.graph, &self.code, &own, &mut m.partition);
@@ -180,7 +189,7 @@ impl Trace {
                     (1..m.sites.len()).for_each(|i| m.partition.join(0, i as u32));
                 }
                 if read.unclear {
-                    let why = "a function with `mem` within what it decides about makes observations";
+                    let why = "a `mem` function called under its control makes observations";
                     return Err(self.cannot_sum(m.sites[0], why));
                 }
                 found.scores.extend(read.scores);
@@ -215,9 +224,11 @@ impl Trace {
                 let label = Reader::new(&self.graph, &self.code, own, &mut m.partition).read_failed(&failed);
                 self.graph.rollback(&self.code, before);
                 match new {
-                    Some(node) => {
-                        Err(self.cannot_sum(Target { node, element: NONE }, "it is improper and appears with others"))
-                    }
+                    Some(node) => Err(self.cannot_sum(
+                        Target { node, element: NONE },
+                        "it is improper and \
+                            is created together with other choices",
+                    )),
                     None => Ok(Err(label)),
                 }
             }
@@ -245,7 +256,7 @@ impl Trace {
             nodes.any(|n| g.nodes[n as usize].refs > 0)
         };
         match g.detached.iter().any(stays) {
-            true => Err(self.cannot_sum(t, "other choices appear or vanish with it")),
+            true => Err(self.cannot_sum(t, "other choices are created or removed with it")),
             false => Ok(()),
         }
     }

@@ -11,7 +11,7 @@ use crate::trace::{Change, Draws, Selection, Target, Trace, TraceResult};
 use rustc_hash::FxHashSet;
 
 /// Why a step cannot be made where what was drawn for it changes what it needs.
-const BY_CHANCE: &str = "what it asks for depends on choices that are drawn for the step";
+const BY_CHANCE: &str = "which choices it needs depends on choices drawn during the step";
 
 /// What stays until [`Trace::let_go`].
 #[derive(Debug, Default)]
@@ -85,7 +85,11 @@ impl Trace {
                 }
                 Explored::Structure(changes) => {
                     if drawn || self.propose(&changes, draws)?.appeared == 0 {
-                        return Err(self.cannot_sum(m.sites[0], "other choices appear or vanish with it"));
+                        return Err(self.cannot_sum(
+                            m.sites[0],
+                            "other choices are created or \
+                            removed with it",
+                        ));
                     }
                     self.commit();
                     self.hold_all(held)?;
@@ -118,7 +122,13 @@ impl Trace {
 
     /// Enters the choices that there are now.
     fn take_up(&self, m: &mut Marginal, sites: Selection, moving: Selection) -> TraceResult<()> {
-        let not = |t: &Target| self.cannot_sum(*t, "it is not a discrete choice of finitely many values");
+        let not = |t: &Target| {
+            self.cannot_sum(
+                *t,
+                "it is not a discrete choice with finitely \
+            many values",
+            )
+        };
         let known: FxHashSet<Target> = m.sites.iter().copied().collect();
         for t in self.targets(sites).iter().filter(|t| !known.contains(t)) {
             let support = self.dist(*t).map(|d| d.stored_support()).filter(Support::is_finite).ok_or_else(|| not(t))?;
@@ -158,7 +168,7 @@ impl Trace {
         match held.frames.iter().find(makes_observations) {
             Some(_) => {
                 let t = Target { node: held.nodes[0], element: NONE };
-                Err(self.cannot_sum(t, "it is in a function with `mem` that makes observations"))
+                Err(self.cannot_sum(t, "it is in a `mem` function that makes observations"))
             }
             None => Ok(()),
         }

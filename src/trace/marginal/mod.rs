@@ -197,7 +197,11 @@ impl Trace {
             span: self.span(t.node),
             address: self.address(t),
             calls: Vec::new(),
-            hint: Some("select finite discrete choices with `marginal`, and move others by gibbs".into()),
+            hint: Some(
+                "select only finite discrete choices with `marginal`, and update the \
+                        others with gibbs"
+                    .into(),
+            ),
         })
     }
 }

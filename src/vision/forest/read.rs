@@ -74,7 +74,7 @@ fn parse(text: impl BufRead) -> Result<Forest, String> {
             Token::Name(name, false) => {
                 let p = part(&name);
                 if seen.contains(&p) {
-                    return Err(tokens.wrong(format!("`{name}` comes twice")));
+                    return Err(tokens.wrong(format!("`{name}` occurs twice")));
                 }
                 if p != Part::Other {
                     seen.push(p);
@@ -84,7 +84,7 @@ fn parse(text: impl BufRead) -> Result<Forest, String> {
             Token::Name(name, true) => match at {
                 Some(Part::Options) if option.is_none() => option = Some(name),
                 Some(Part::Other) => {}
-                _ => return Err(tokens.wrong(format!("`{name}` was not expected"))),
+                _ => return Err(tokens.wrong(format!("unexpected `{name}`"))),
             },
             Token::Number(x) => {
                 let whole = |most: u32| match x >= 0.0 && x <= f64::from(most) && x.fract() == 0.0 {
@@ -93,9 +93,10 @@ fn parse(text: impl BufRead) -> Result<Forest, String> {
                 };
                 let room = |n: usize, most: usize| match n < most {
                     true => Ok(()),
-                    false => {
-                        Err(tokens.wrong(format!("the forest is too large; at most {most} numbers of a kind are read")))
-                    }
+                    false => Err(tokens.wrong(format!(
+                        "the forest is too large; at most {most} numbers \
+                            of one kind are supported"
+                    ))),
                 };
                 match at {
                     Some(Part::Options) => {
@@ -140,11 +141,11 @@ fn options(given: &[(String, usize)]) -> Result<ForestOptions, String> {
         let mut found = given.iter().filter(|(n, _)| n == name).map(|(_, v)| *v);
         let value = found.next().ok_or_else(|| format!("the option `{name}` is missing"))?;
         if found.next().is_some() {
-            return Err(format!("the option `{name}` comes twice"));
+            return Err(format!("the option `{name}` occurs twice"));
         }
         match (least..=most).contains(&value) {
             true => Ok(value),
-            false => Err(format!("the option `{name}` must be {least} to {most}, not {value}")),
+            false => Err(format!("the option `{name}` must be from {least} to {most}, not {value}")),
         }
     };
     let options = ForestOptions {
@@ -168,7 +169,7 @@ fn options(given: &[(String, usize)]) -> Result<ForestOptions, String> {
         (!o.stride.is_multiple_of(o.shrink), "`stride` must be a multiple of `shrinkNumber`"),
         (
             o.inner > o.patch || !(o.patch - o.inner).is_multiple_of(2),
-            "`patchInnerSize` must leave an even rest of `patchSize`",
+            "`patchSize` minus `patchInnerSize` must be even",
         ),
         (o.evaluated > o.trees, "`numberOfTreesToEvaluate` must be at most `numberOfTrees`"),
         (o.cells() < 2 * o.grid, "`selfsimilarityGridSize` must be at most half of `patchSize` by `shrinkNumber`"),
@@ -219,7 +220,11 @@ fn checked(raw: Raw) -> Result<Forest, String> {
         return Err(format!("{count} nodes need {} numbers of `edgeBoundaries`, not {}", count + 1, begins.len()));
     }
     if begins.windows(2).any(|w| w[0] > w[1]) || begins.last().is_some_and(|e| *e as usize > raw.pixels.len()) {
-        return Err(format!("`edgeBoundaries` must go up, to at most {}, the length of `edgeBins`", raw.pixels.len()));
+        return Err(format!(
+            "`edgeBoundaries` must be ascending, up to at most {}, the length of \
+                            `edgeBins`",
+            raw.pixels.len()
+        ));
     }
     // Edges may be told by direction, one after the other; here only their places count.
     let area = options.inner * options.inner;

@@ -257,16 +257,16 @@ fn files_that_cannot_be_used() {
         changed(&move |t: &mut Text| t.options.iter_mut().filter(|o| o.0 == name).for_each(|o| o.1 = value))
     };
     for (why, text) in [
-        (set("stride", 0), "`stride` must be 1 to 128, not 0"),
+        (set("stride", 0), "`stride` must be from 1 to 128, not 0"),
         (set("stride", 3), "`stride` must be a multiple"),
         (set("shrinkNumber", 3), "must be even"),
-        (set("patchSize", 1000), "`patchSize` must be 2 to 128"),
-        (set("patchInnerSize", 64), "must leave an even rest"),
+        (set("patchSize", 1000), "`patchSize` must be from 2 to 128"),
+        (set("patchInnerSize", 64), "must be even"),
         (set("numberOfTrees", 3), "14 nodes cannot be those of 3 trees"),
         (set("numberOfTreesToEvaluate", 3), "at most `numberOfTrees`"),
         (set("selfsimilarityGridSize", 9), "at most half"),
         (changed(&|t| t.options.truncate(5)), "the option `gradientSmoothingRadius` is missing"),
-        (changed(&|t| t.options.push(("stride", 2))), "the option `stride` comes twice"),
+        (changed(&|t| t.options.push(("stride", 2))), "the option `stride` occurs twice"),
         (changed(&|t| t.options.clear()), "there are no `options`"),
         (changed(&|t| t.children[2] = 3), "node 2 of tree 0 has the child 3"),
         (changed(&|t| t.children[0] = 7), "node 0 of tree 0 has the child 7"),
@@ -274,7 +274,7 @@ fn files_that_cannot_be_used() {
         (changed(&|t| t.features[0] = 7228), "node 0 of tree 0 asks for feature 7228 of 7228"),
         (changed(&|t| t.thresholds.truncate(13)), "14 numbers of `childs`, but 13 of `thresholds`"),
         (changed(&|t| t.boundaries.truncate(10)), "14 nodes need 15 numbers of `edgeBoundaries`, not 10"),
-        (changed(&|t| t.boundaries[3] = 40), "must go up"),
+        (changed(&|t| t.boundaries[3] = 40), "must be ascending"),
         (changed(&|t| *t.boundaries.last_mut().unwrap() = 129), "at most 128"),
         (changed(&|t| t.pixels[0] = 13 * 256), "a patch's middle has 256 pixels"),
         (changed(&|t| t.pixels[0] = 70_000), "70000 is not a whole number from 0 to 65535"),
@@ -283,8 +283,8 @@ fn files_that_cannot_be_used() {
     }
     let read = |text: &str| Forest::read(text.as_bytes()).unwrap_err().to_string();
     assert!(read("1").contains("a number without a name"));
-    assert!(read("options:\n  stride: 2\noptions:\n").contains("line 3: `options` comes twice"));
-    assert!(read("childs:\n  x: 2\n").contains("line 2: `x` was not expected"));
+    assert!(read("options:\n  stride: 2\noptions:\n").contains("line 3: `options` occurs twice"));
+    assert!(read("childs:\n  x: 2\n").contains("line 2: unexpected `x`"));
     assert!(read("options: [ 2 ]").contains("an option has no name"));
     assert!(read("childs: [ 1.5 ]").contains("1.5 is not a whole number"));
     assert!(read("childs: [ -1 ]").contains("-1 is not a whole number"));

@@ -45,8 +45,11 @@ impl<R: BufRead> Tokens<R> {
             return match self.from.fill_buf() {
                 Ok(bytes) => Ok(bytes.first().copied()),
                 Err(e) if e.kind() == ErrorKind::Interrupted => continue,
-                Err(e) if e.kind() == ErrorKind::UnexpectedEof => Err(self.wrong("the file is cut short")),
-                Err(e) => Err(self.wrong(format!("it cannot be unpacked: {e}"))),
+                Err(e) if e.kind() == ErrorKind::UnexpectedEof => Err(self.wrong(
+                    "the file is \
+                    truncated",
+                )),
+                Err(e) => Err(self.wrong(format!("cannot decompress it: {e}"))),
             };
         }
     }
@@ -55,7 +58,7 @@ impl<R: BufRead> Tokens<R> {
         self.from.consume(1);
         self.read += 1;
         match self.read > self.most {
-            true => Err(format!("the text is too long; at most {} bytes are read", self.most)),
+            true => Err(format!("the text is too long; at most {} bytes are supported", self.most)),
             false => Ok(()),
         }
     }
@@ -86,7 +89,7 @@ impl<R: BufRead> Tokens<R> {
                 b'[' => {
                     self.depth += 1;
                     if self.depth > 2 {
-                        return Err(self.wrong("lists within lists within lists"));
+                        return Err(self.wrong("lists are nested too deeply"));
                     }
                     self.begun = true;
                     self.skip()?;
@@ -105,7 +108,7 @@ impl<R: BufRead> Tokens<R> {
         }
         match self.depth {
             0 => Ok(None),
-            _ => Err(self.wrong("the file is cut short: a list has no end")),
+            _ => Err(self.wrong("the file is truncated: a list has no end")),
         }
     }
 
@@ -117,7 +120,7 @@ impl<R: BufRead> Tokens<R> {
             if !(b.is_ascii_alphanumeric() || matches!(b, b'_' | b'.' | b'-' | b'+')) {
                 break;
             }
-            *word.get_mut(n).ok_or_else(|| self.wrong("a word of more than 64 letters"))? = b;
+            *word.get_mut(n).ok_or_else(|| self.wrong("a word of more than 64 characters"))? = b;
             n += 1;
             self.skip()?;
         }
@@ -130,7 +133,7 @@ impl<R: BufRead> Tokens<R> {
         match word {
             [] => {
                 let b = self.peek()?.unwrap_or(b' ');
-                Err(self.wrong(format!("`{}` was not expected", char::from(b).escape_default())))
+                Err(self.wrong(format!("unexpected `{}`", char::from(b).escape_default())))
             }
             // Another list item follows on the same line.
             b"-" if self.depth == 0 => {
@@ -141,7 +144,7 @@ impl<R: BufRead> Tokens<R> {
             b"---" | b"..." if first && !self.indented => Ok(None),
             _ => match number(word) {
                 Some(x) => Ok(Some(Token::Number(x))),
-                None => Err(self.wrong(format!("`{}` is no number", String::from_utf8_lossy(word)))),
+                None => Err(self.wrong(format!("`{}` is not a number", String::from_utf8_lossy(word)))),
             },
         }
     }
@@ -198,16 +201,16 @@ mod tests {
     #[test]
     fn what_is_no_such_text() {
         for (text, why) in [
-            ("a: [ 1, 2", "line 1: the file is cut short: a list has no end"),
+            ("a: [ 1, 2", "line 1: the file is truncated: a list has no end"),
             ("a: ]", "line 1: `]` without `[`"),
-            ("a:\n- [ 1, x ]", "line 2: `x` is no number"),
-            ("a: 1.2.3", "line 1: `1.2.3` is no number"),
-            ("a: inf", "line 1: `inf` is no number"),
-            ("a: 1e999", "line 1: `1e999` is no number"),
-            ("a: [[[1]]]", "line 1: lists within lists within lists"),
-            ("\n\n{a}", "line 3: `{` was not expected"),
-            ("a: \u{e4}", "line 1: `\\u{c3}` was not expected"),
-            ("a: 1, 2", "line 1: `,` was not expected"),
+            ("a:\n- [ 1, x ]", "line 2: `x` is not a number"),
+            ("a: 1.2.3", "line 1: `1.2.3` is not a number"),
+            ("a: inf", "line 1: `inf` is not a number"),
+            ("a: 1e999", "line 1: `1e999` is not a number"),
+            ("a: [[[1]]]", "line 1: lists are nested too deeply"),
+            ("\n\n{a}", "line 3: unexpected `{`"),
+            ("a: \u{e4}", "line 1: unexpected `\\u{c3}`"),
+            ("a: 1, 2", "line 1: unexpected `,`"),
         ] {
             assert_eq!(tokens(text).unwrap_err(), why, "{text}");
         }

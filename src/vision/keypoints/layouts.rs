@@ -92,7 +92,10 @@ fn named(all: &Node) -> Result<Keypoints, KeypointsError> {
         };
         let name = Arc::from(usual(name));
         if points.iter().any(|p| p.name == name) {
-            return Err(n.wrong(&format!("given once: there is another spelling of `{name}`")));
+            return Err(n.wrong(&format!(
+                "given only once, but `{name}` also occurs in another \
+                spelling"
+            )));
         }
         let (x, y) = (x.number("a number of pixels")?, y.number("a number of pixels")?);
         points.push(Keypoint::new(name, [x, y], confidence));
@@ -205,7 +208,7 @@ fn landmarks(list: &Node) -> Result<Keypoints, KeypointsError> {
     let mut points = Vec::new();
     for (n, name) in list.items().zip(MEDIAPIPE) {
         let coordinate = |key: &str| match n.get(key) {
-            Some(x) => x.number("a share of the image's side"),
+            Some(x) => x.number("a fraction of the image's side"),
             None => Err(n.wrong("a landmark {\"x\": …, \"y\": …, \"visibility\": …}")),
         };
         let confidence = n.get("visibility").map_or(Ok(1.0), |c| confidence(&c))?;

@@ -23,9 +23,13 @@ pub fn matching(
     for p in detected.points() {
         let at = landmarks.iter().position(|l| *l == &*p.name);
         if at.is_none() && !may_lack(&p.name) {
-            let e = KeypointsError::new(format!("`{}` was detected, and the scene has no such landmark", p.name));
+            let e = KeypointsError::new(format!(
+                "`{}` was detected, but the scene has no such \
+                landmark",
+                p.name
+            ));
             return Err(match nearest(&p.name, landmarks) {
-                _ if landmarks.is_empty() => e.hint("it has none at all"),
+                _ if landmarks.is_empty() => e.hint("it has no landmarks"),
                 Some(n) => e.hint(format!("did you mean `{n}`? It has {}", first(landmarks.iter().copied(), LISTED))),
                 None => e.hint(format!("it has {}", first(landmarks.iter().copied(), LISTED))),
             });
@@ -57,12 +61,17 @@ mod tests {
         };
         assert_eq!(
             said(&["nose", "l_wirst"], &rig),
-            "`l_wirst` was detected, and the scene has no such landmark; did you mean `l_wrist`? It has l_wrist, nose, tail"
+            "`l_wirst` was detected, but the scene has no such landmark; did you mean `l_wrist`? \
+             It has l_wrist, nose, tail"
         );
-        assert_eq!(said(&["wing"], &["a"]), "`wing` was detected, and the scene has no such landmark; it has a");
+        assert_eq!(
+            said(&["wing"], &["a"]),
+            "`wing` was detected, but the scene has no such \
+            landmark; it has a"
+        );
         assert_eq!(
             said(&["l_hip"], &[]),
-            "`l_hip` was detected, and the scene has no such landmark; it has none at all"
+            "`l_hip` was detected, but the scene has no such landmark; it has no landmarks"
         );
     }
 }

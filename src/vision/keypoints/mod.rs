@@ -93,14 +93,18 @@ impl Keypoints {
     pub fn new(points: Vec<Keypoint>) -> Result<Keypoints, KeypointsError> {
         for (i, p) in points.iter().enumerate() {
             if points[..i].iter().any(|q| q.name == p.name) {
-                return Err(KeypointsError::new(format!("the keypoint `{}` is there twice", p.name)));
+                return Err(KeypointsError::new(format!("the keypoint `{}` occurs twice", p.name)));
             }
             if !(p.x.is_finite() && p.y.is_finite()) {
                 return Err(KeypointsError::new(format!("the position of the keypoint `{}` is not finite", p.name)));
             }
             let sound = |o: &Elsewhere| o.x.is_finite() && o.y.is_finite() && o.weight > 0.0 && o.weight.is_finite();
             if !p.others.iter().all(sound) {
-                return Err(KeypointsError::new(format!("another place of the keypoint `{}` is not finite", p.name)));
+                return Err(KeypointsError::new(format!(
+                    "an alternative position of the keypoint \
+                    `{}` is not finite",
+                    p.name
+                )));
             }
             if !(0.0..=1.0).contains(&p.confidence) {
                 let (name, c) = (&p.name, p.confidence);

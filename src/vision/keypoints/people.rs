@@ -70,7 +70,10 @@ impl People {
             ([one], _) => Ok(one.keypoints.clone()),
             (_, Some(stem)) => match self.find(stem)? {
                 Some(p) => Ok(p.keypoints.clone()),
-                None => Err(self.several(&format!("; none of them is `{stem}`, as the picture is"))),
+                None => Err(self.several(&format!(
+                    "; none of them has the name of the picture, \
+                    `{stem}`"
+                ))),
             },
             _ => Err(self.several("")),
         }
@@ -90,22 +93,25 @@ impl People {
             _ => {
                 let ids = first(found.iter().map(|p| p.id.as_str()), 8);
                 let message = format!("there are {} people in the picture `{id}`: {ids}", found.len());
-                Err(KeypointsError::new(message).hint("add `#` and an id to the name of the file to choose one"))
+                Err(KeypointsError::new(message).hint(
+                    "add `#` and an id to the file name to \
+                    choose one",
+                ))
             }
         }
     }
 
     fn nobody(&self, id: &str) -> KeypointsError {
-        let e = KeypointsError::new(format!("there is nobody with the id `{id}`"));
+        let e = KeypointsError::new(format!("no person has the id `{id}`"));
         match self.all[..] {
-            [] => e.hint("there is nobody in the file at all"),
+            [] => e.hint("the file contains no people"),
             [Person { id: ref only, .. }] if only.is_empty() => e.hint("there is one person, without an id"),
             _ => e.hint(format!("there are {}", first(self.ids(), 8))),
         }
     }
 
     fn several(&self, more: &str) -> KeypointsError {
-        let message = format!("there are {} people in it: {}{more}", self.len(), first(self.ids(), 5));
-        KeypointsError::new(message).hint("add `#` and an id to the name of the file to choose one")
+        let message = format!("it contains {} people: {}{more}", self.len(), first(self.ids(), 5));
+        KeypointsError::new(message).hint("add `#` and an id to the file name to choose one")
     }
 }

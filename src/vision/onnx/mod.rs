@@ -63,11 +63,11 @@ impl Network {
     /// If it is damaged, has operators that are not known, takes something other than one picture, or has no such output.
     pub fn read(bytes: &[u8], options: &NetworkOptions) -> Result<Network, VisionError> {
         let model = guarded("read", || {
-            Model::load(bytes.to_vec()).map_err(|e| wrong(format!("the network cannot be read: {e}")))
+            Model::load(bytes.to_vec()).map_err(|e| wrong(format!("cannot read the network: {e}")))
         })?;
         let &[input] = model.input_ids() else {
             let n = model.input_ids().len();
-            return Err(wrong(format!("the network takes {n} inputs; one, a picture, is needed")));
+            return Err(wrong(format!("the network takes {n} inputs; it must take one, a picture")));
         };
         let takes = takes(&model, input)?;
         let (output, called) = output(&model, &options.output)?;
@@ -107,11 +107,16 @@ impl Network {
             let given = self.model.run(vec![(self.input, input.into())], &[self.output], None);
             given.map_err(|e| wrong(format!("the network failed: {e}")))
         })?;
-        let value = given.into_iter().next().ok_or_else(|| wrong("the network gave nothing"))?;
-        let (shape, mut values) = numbers(value).ok_or_else(|| self.unfit("has no numbers of single precision"))?;
+        let value = given.into_iter().next().ok_or_else(|| wrong("the network produced no output"))?;
+        let (shape, mut values) = numbers(value).ok_or_else(|| {
+            self.unfit(
+                "is not in single \
+            precision",
+            )
+        })?;
         let (width, height) = side_lengths(&shape, (width, height)).map_err(|why| self.unfit(&why))?;
         if values.iter().any(|v| !v.is_finite()) {
-            return Err(self.unfit("has values that are no finite numbers"));
+            return Err(self.unfit("has values that are not finite"));
         }
         if self.options.logits {
             values.iter_mut().for_each(|v| *v = 1.0 / (1.0 + libm::expf(-*v)));
@@ -119,7 +124,8 @@ impl Network {
         let (least, most) = values.iter().fold((0.0f32, 0.0f32), |(a, b), v| (a.min(*v), b.max(*v)));
         if least < -0.01 || most > 1.01 {
             return Err(self.unfit(&format!(
-                "has values from {least} to {most}, not from 0 to 1; if they are log odds, say logits = true"
+                "has values from {least} to {most}, not from 0 to 1; if they are log odds, set \
+                 logits = true"
             )));
         }
         Ok(SoftMap { width, height, values, shows: self.options.shows })
@@ -158,7 +164,7 @@ impl Network {
 fn takes(model: &Model, input: NodeId) -> Result<Takes, VisionError> {
     let info = model.node_info(input).ok_or_else(|| wrong("the network has no input"))?;
     if info.dtype().is_some_and(|t| t != ValueType::Tensor(DataType::Float)) {
-        return Err(wrong("the network takes numbers other than of single precision"));
+        return Err(wrong("the network's input is not in single precision"));
     }
     let Some(shape) = info.shape() else {
         // Nothing is said: colours, channels first, as most are.
@@ -175,10 +181,10 @@ fn takes(model: &Model, input: NodeId) -> Result<Takes, VisionError> {
         format!("[{}]", sizes.join(", "))
     };
     let [batch, second, third, last] = &shape[..] else {
-        return Err(wrong(format!("the network takes {}; a picture has 4 dimensions there", shown())));
+        return Err(wrong(format!("the network takes {}; the input must have 4 dimensions", shown())));
     };
     if matches!(batch, Dimension::Fixed(n) if *n != 1) {
-        return Err(wrong(format!("the network takes {}; one picture at a time is needed", shown())));
+        return Err(wrong(format!("the network takes {}; it must take one picture at a time", shown())));
     }
     let count = |d: &Dimension| match d {
         Dimension::Fixed(n @ (1 | 3)) => Some(*n),
@@ -188,7 +194,7 @@ fn takes(model: &Model, input: NodeId) -> Result<Takes, VisionError> {
         (Some(n), _) => (false, n, third, last),
         (None, Some(n)) => (true, n, second, third),
         (None, None) if matches!(second, Dimension::Symbolic(_)) => (false, 3, third, last),
-        _ => return Err(wrong(format!("the network takes {}; 1 or 3 channels are needed", shown()))),
+        _ => return Err(wrong(format!("the network takes {}; it must take 1 or 3 channels", shown()))),
     };
     let side = |d: &Dimension| match d {
         Dimension::Fixed(n) if (1..=SIDE).contains(n) => Ok(Some(*n as u32)),
@@ -216,9 +222,9 @@ fn output(model: &Model, which: &Output) -> Result<(NodeId, String), VisionError
         Output::Named(name) => all.iter().find(|(_, n)| n == name),
     };
     found.cloned().ok_or_else(|| match which {
-        Output::Last => wrong("the network gives nothing"),
-        Output::Number(n) => wrong(format!("the network has no output {n}, but {}: {}", all.len(), names())),
-        Output::Named(name) => wrong(format!("the network has no output `{name}`, but {}", names())),
+        Output::Last => wrong("the network has no output"),
+        Output::Number(n) => wrong(format!("the network has no output {n}; it has {}: {}", all.len(), names())),
+        Output::Named(name) => wrong(format!("the network has no output `{name}`; it has {}", names())),
     })
 }
 
@@ -243,7 +249,10 @@ fn side_lengths(shape: &[usize], (width, height): (u32, u32)) -> Result<(u32, u3
     let (a, b) = (w as u64 * u64::from(height), h as u64 * u64::from(width));
     // A pixel more or less comes from rounding.
     if w == 0 || h == 0 || w > SIDE || h > SIDE || a.abs_diff(b) > u64::from(width.max(height)) {
-        return Err(format!("is {w} x {h} pixels, which has not the shape of the picture, {width} x {height}"));
+        return Err(format!(
+            "is {w} x {h} pixels, which does not match the aspect ratio of the \
+                            picture, {width} x {height}"
+        ));
     }
     Ok((w as u32, h as u32))
 }

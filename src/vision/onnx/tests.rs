@@ -159,8 +159,16 @@ fn outputs_by_place_and_by_name() {
     assert!((of(Output::Number(2)).unwrap() - sigmoid).abs() < 1e-5);
     assert_eq!(of(Output::Number(1)).unwrap(), 0.5);
     assert_eq!(of(Output::Named("side".into())).unwrap(), 0.5);
-    assert_eq!(of(Output::Number(3)).unwrap_err(), "the network has no output 3, but 2: side, fused");
-    assert_eq!(of(Output::Named("d0".into())).unwrap_err(), "the network has no output `d0`, but side, fused");
+    assert_eq!(
+        of(Output::Number(3)).unwrap_err(),
+        "the network has no output 3; it has 2: side, \
+        fused"
+    );
+    assert_eq!(
+        of(Output::Named("d0".into())).unwrap_err(),
+        "the network has no output `d0`; it \
+        has side, fused"
+    );
 }
 
 #[test]
@@ -173,12 +181,13 @@ fn values_beyond_1_are_log_odds_or_an_error() {
     let why = of(false).unwrap_err();
     assert_eq!(
         why,
-        "the output `fused` has values from -4 to 0, not from 0 to 1; if they are log odds, say logits = true"
+        "the output `fused` has values from -4 to 0, not from 0 to 1; if they are log odds, set \
+         logits = true"
     );
     assert!((of(true).unwrap() - 1.0 / (1.0 + libm::expf(4.0))).abs() < 1e-6);
     let endless = weighted(3, SIDES, &[f32::INFINITY, 0.0, 0.0], "Identity");
     let found = network(&endless, &NetworkOptions::default()).unwrap().map(&photo(64, 64), 64);
-    assert!(found.unwrap_err().to_string().contains("no finite numbers"));
+    assert!(found.unwrap_err().to_string().contains("not finite"));
 }
 
 #[test]
@@ -238,13 +247,13 @@ fn networks_that_are_of_no_use() {
     };
     let input = |dims: &'static [u64]| with(&move |g| g.inputs[0].2 = dims.iter().map(|n| Dim::Of(*n)).collect());
     for (why, says) in [
-        (with(&|g| g.inputs.push(("other", 1, shape(3, SIDES)))), "the network takes 2 inputs; one"),
-        (with(&|g| g.inputs[0].1 = 6), "numbers other than of single precision"),
-        (input(&[3, 64, 64]), "the network takes [3, 64, 64]; a picture has 4 dimensions"),
+        (with(&|g| g.inputs.push(("other", 1, shape(3, SIDES)))), "the network takes 2 inputs; it must take one"),
+        (with(&|g| g.inputs[0].1 = 6), "input is not in single precision"),
+        (input(&[3, 64, 64]), "the network takes [3, 64, 64]; the input must have 4 dimensions"),
         (input(&[2, 3, 64, 64]), "one picture at a time"),
-        (input(&[1, 4, 64, 64]), "1 or 3 channels are needed"),
+        (input(&[1, 4, 64, 64]), "it must take 1 or 3 channels"),
         (input(&[1, 3, 64, 9999]), "sides may be 1 to 4096"),
-        (with(&|g| g.outputs.clear()), "the network gives nothing"),
+        (with(&|g| g.outputs.clear()), "the network has no output"),
         // A picture of three channels for a map.
         (
             with(&|g| {
@@ -266,7 +275,11 @@ fn networks_that_are_of_no_use() {
     let mut thin = weighted(3, [Dim::Of(64), Dim::Of(64)], &[1.0, 0.0, 0.0], "Identity");
     thin.outputs[1].1 = shape(1, [Dim::Of(64), Dim::Of(32)]);
     let why = network(&thin, &plain).unwrap_err();
-    assert_eq!(why, "the output `fused` is 32 x 64 pixels, which has not the shape of the picture, 64 x 64");
+    assert_eq!(
+        why,
+        "the output `fused` is 32 x 64 pixels, which does not match the aspect ratio \
+                     of the picture, 64 x 64"
+    );
 }
 
 #[test]

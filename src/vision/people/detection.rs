@@ -48,7 +48,7 @@ pub(super) fn check(network: &Network) -> Result<(), NetworkError> {
     if network.input_shape() == [1, SIDE, SIDE, 3] && outputs == [&[1, count, NUMBERS][..], &[1, count, 1]] {
         return Ok(());
     }
-    Err(NetworkError::Format("it is not one that detects people (pose_detection.tflite)".into()))
+    Err(NetworkError::Format("it is not a person detector (pose_detection.tflite)".into()))
 }
 
 /// The people in a view of a picture with a score of at least this, best first.

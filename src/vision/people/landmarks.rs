@@ -48,7 +48,7 @@ pub(super) fn check(network: &Network) -> Result<(), NetworkError> {
     if network.input_shape() == [1, SIDE, SIDE, 3] && outputs == wanted {
         return Ok(());
     }
-    Err(NetworkError::Format("it is not one for a person's landmarks (pose_landmark_*.tflite)".into()))
+    Err(NetworkError::Format("it is not a landmark network (pose_landmark_*.tflite)".into()))
 }
 
 /// The same landmark of the other side of the body.

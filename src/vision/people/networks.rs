@@ -27,7 +27,8 @@ pub fn files() -> Result<(&'static [u8], &'static [u8]), String> {
 /// Why there are none.
 #[cfg(not(feature = "models"))]
 pub fn files() -> Result<(&'static [u8], &'static [u8]), String> {
-    Err("this build has no networks that find people in it (feature `models`): name a folder with them, --models DIR"
+    Err("this build does not include the networks that detect people (feature `models`): give a \
+         folder with them, --models DIR"
         .into())
 }
 

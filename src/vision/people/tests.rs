@@ -217,7 +217,7 @@ mod shipped {
     #[test]
     fn a_network_for_something_else_is_refused() {
         let exchanged = PeopleFinder::new(pcadlang_models::LANDMARKS, pcadlang_models::DETECTION).unwrap_err();
-        assert!(exchanged.to_string().contains("it is not one that detects people"), "{exchanged}");
+        assert!(exchanged.to_string().contains("it is not a person detector"), "{exchanged}");
         assert!(PeopleFinder::new(b"", pcadlang_models::LANDMARKS).is_err());
     }
 }

@@ -108,11 +108,11 @@ impl System<'_> {
             if k == 0 {
                 (base, jacobian) = (rest, w.log_jacobian);
             } else if w.log_jacobian.to_bits() != jacobian.to_bits() {
-                let message = "the bounds of a choice depend on one that is summed out";
+                let message = "the bounds of a choice depend on a choice that is summed out";
                 return Err(fail(Default::default(), message.into()));
             } else if rest.to_bits() != base.to_bits() {
-                let message =
-                    "a score depends on choices that are summed out, and was not found to: please report this";
+                let message = "internal error: an undetected dependence of a score on choices that are \
+                     summed out; please report this";
                 return Err(fail(Default::default(), message.into()));
             }
             for (((c, t), seen), v) in conditional.iter_mut().zip(&terms).zip(sums.seen()).zip(values) {

@@ -14,8 +14,8 @@ pub(super) fn load(file: &str, bytes: &[u8], options: &Options, beside: &Beside)
     if gltf::is_gltf(file, bytes) {
         let loaded = gltf::load(bytes, &options.frame(), beside).map_err(plain)?;
         if loaded.rig.is_none() {
-            return Err("the glTF file has no skin, so nothing says which joint moves what; \
-                 read it with mesh(…) and let scene.autorig give it joints"
+            return Err("the glTF file has no skin, so it does not define which joint moves which \
+                        vertices; read it with mesh(…) and rig it with scene.autorig"
                 .into());
         }
         return Ok(Value::object(ArmatureValue(Arc::new(loaded.armature().map_err(plain)?))));

@@ -17,11 +17,13 @@ pub(super) fn parse(bytes: &[u8]) -> Result<Value, String> {
     let mut rows = rows(text, separator(text))?.into_iter();
     let Some((_, header)) = rows.next() else { return Err("the table is empty".into()) };
     if header.iter().all(|h| h.trim().parse::<f64>().is_ok()) {
-        return Err("line 1: the first line must name the columns; it has numbers only".into());
+        return Err("line 1: the first line must be a header with the column names, but it \
+                    contains only numbers"
+            .into());
     }
     let rows: Vec<Row> = rows.collect();
     if let Some((line, row)) = rows.iter().find(|(_, row)| row.len() != header.len()) {
-        return Err(format!("line {line}: {} fields where the header has {}", row.len(), header.len()));
+        return Err(format!("line {line}: {} fields, but the header has {}", row.len(), header.len()));
     }
     let mut table = Record::new();
     for (i, name) in header.iter().enumerate() {
@@ -41,7 +43,7 @@ fn column(name: &str, i: usize, rows: &[Row]) -> Result<Value, String> {
     let fields = || rows.iter().map(|(line, row)| (*line, row.get(i).map_or("", |f| f.trim())));
     let numbers: Vec<f64> = fields().filter_map(|(_, f)| f.parse().ok()).collect();
     if let Some((line, _)) = fields().find(|(_, f)| f.parse::<f64>().is_ok_and(f64::is_nan)) {
-        return Err(format!("line {line}: column `{name}` has a NaN; leave out the row"));
+        return Err(format!("line {line}: column `{name}` is NaN; remove the row"));
     }
     if numbers.len() == rows.len() {
         return Ok(Value::array(numbers));
@@ -50,7 +52,7 @@ fn column(name: &str, i: usize, rows: &[Row]) -> Result<Value, String> {
         && fields().all(|(_, f)| f.is_empty() || f.parse::<f64>().is_ok())
         && !numbers.is_empty()
     {
-        return Err(format!("line {line}: column `{name}` is empty there; leave out the row"));
+        return Err(format!("line {line}: column `{name}` is empty; remove the row"));
     }
     let bools: Vec<Value> = fields().filter_map(|(_, f)| f.parse().ok().map(Value::Bool)).collect();
     if bools.len() == rows.len() {
@@ -146,18 +148,22 @@ mod tests {
             read("a,b\n\"1,5\",\"say \"\"hi\"\"\nthere\"\n"),
             "{ a: [\"1,5\"], b: [\"say \\\"hi\\\"\\nthere\"] }"
         );
-        assert_eq!(read("a,b\n\"1\n2\",x\n3\n"), "line 4: 1 fields where the header has 2");
+        assert_eq!(read("a,b\n\"1\n2\",x\n3\n"), "line 4: 1 fields, but the header has 2");
     }
 
     #[test]
     fn mistakes_name_their_line() {
         assert_eq!(read(""), "the table is empty");
-        assert_eq!(read("1,2\n3,4"), "line 1: the first line must name the columns; it has numbers only");
-        assert_eq!(read("x,y\n1,2\n3"), "line 3: 1 fields where the header has 2");
+        assert_eq!(
+            read("1,2\n3,4"),
+            "line 1: the first line must be a header with the column \
+                                      names, but it contains only numbers"
+        );
+        assert_eq!(read("x,y\n1,2\n3"), "line 3: 1 fields, but the header has 2");
         assert_eq!(read("x,x\n1,2"), "line 1: there are two columns `x`");
         assert_eq!(read("x,\n1,2"), "line 1: column 2 has no name");
-        assert_eq!(read("x,y\n1,2\n\n,3"), "line 4: column `x` is empty there; leave out the row");
-        assert_eq!(read("x\n1\nnan"), "line 3: column `x` has a NaN; leave out the row");
+        assert_eq!(read("x,y\n1,2\n\n,3"), "line 4: column `x` is empty; remove the row");
+        assert_eq!(read("x\n1\nnan"), "line 3: column `x` is NaN; remove the row");
         assert_eq!(read("x\n\"1"), "line 2: a quoted field is not closed");
         assert_eq!(parse(&[b'x', 0xff]).unwrap_err(), "not UTF-8 text (byte 1)");
     }

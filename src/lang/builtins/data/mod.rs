@@ -28,19 +28,43 @@ const FILE: &[Arg] = &[arg("file", Type::Str, "The path, relative to the program
 
 const SHAPE: &[Arg] = &[
     arg("file", Type::Str, "The path, relative to the program's folder."),
-    opt("up", Type::Str, "\"y\"", "The file's axis that points up: \"x\", \"y\" or \"z\"; it is turned to +y."),
-    opt("unit", Type::Num, "1", "The length of the file's unit in scene units: 0.01 where it is centimetres.")
-        .unit("m"),
+    opt("up", Type::Str, "\"y\"", "The file's up axis: \"x\", \"y\" or \"z\"; it is rotated to +y."),
+    opt(
+        "unit",
+        Type::Num,
+        "1",
+        "The length of the file's unit in scene units: 0.01 for \
+                                 centimetres.",
+    )
+    .unit("m"),
 ];
 
 const NETWORK: &[Arg] = &[
     opt("file", Type::Str, "none", "The path, relative to the program's folder."),
-    opt("colours", Type::Str, "\"rgb\"", "The order of the channels that the network takes, \"rgb\" or \"bgr\"."),
-    opt("white", Type::Num, "1", "The value of white, above 0; what the network gets is (value - mean) / spread."),
-    opt("mean", Type::Any, "0", "The mean that is taken away: a number, or one for each channel."),
-    opt("spread", Type::Any, "1", "By what that is divided: a number, or one for each channel."),
-    opt("output", Type::Any, "the last", "The output that is the map: its name, or its number from 1."),
-    opt("logits", Type::Bool, "false", "Whether the map is of log odds, not of probabilities."),
+    opt(
+        "colours",
+        Type::Str,
+        "\"rgb\"",
+        "The order of the network's input channels, \"rgb\" or \
+        \"bgr\".",
+    ),
+    opt(
+        "white",
+        Type::Num,
+        "1",
+        "The value of white, above 0; the network's input is (value - \
+                                  mean) / spread.",
+    ),
+    opt("mean", Type::Any, "0", "The mean to subtract: a number, or one per channel."),
+    opt("spread", Type::Any, "1", "The divisor: a number, or one per channel."),
+    opt(
+        "output",
+        Type::Any,
+        "the last",
+        "The output to use as the map: its name, or its number \
+        from 1.",
+    ),
+    opt("logits", Type::Bool, "false", "Whether the map holds log odds instead of probabilities."),
     opt("shows", Type::Str, "\"contours\"", "What the map shows, \"contours\" or \"objects\"."),
 ];
 
@@ -54,9 +78,9 @@ pub(super) const TABLE: &[Row] = &[
     kind(
         "image",
         Type::Object("an image"),
-        "A photograph, PNG or JPEG; its contours are found when a likelihood looks.",
+        "A photograph, PNG or JPEG; its contours are detected when a likelihood needs them.",
     ),
-    kind("contours", Type::Object("an image"), "A ready contour map: bright pixels are contour."),
+    kind("contours", Type::Object("an image"), "A contour map: bright pixels are contour."),
     kind("mask", Type::Object("a mask"), "A mask: bright pixels are the object."),
     kind("depth", Type::Object("a depth map"), "A depth map: `.npy`, or a 16-bit PNG in thousandths of a scene unit."),
     function(
@@ -64,8 +88,9 @@ pub(super) const TABLE: &[Row] = &[
         SECTION,
         NETWORK,
         Type::Object("a detector"),
-        "What finds contours in photographs, for `scene.edges`: a structured forest of OpenCV (`model.yml.gz`), or a network (`.onnx`; \
-         only in builds with the feature `onnx`), which the options are for; without a file the one that is built in. See `docs/detectors.md`.",
+        "A contour detector for photographs, for `scene.edges`: an OpenCV structured forest \
+         (`model.yml.gz`), or a network (`.onnx`; only in builds with the feature `onnx`), to \
+         which the options apply; without a file, the built-in detector. See `docs/detectors.md`.",
         not_an_expression,
     ),
     function(
@@ -73,7 +98,8 @@ pub(super) const TABLE: &[Row] = &[
         SECTION,
         SHAPE,
         Type::Object("an armature"),
-        "A body: a glTF file (`.glb`, `.gltf`) with a skin, or a rig file, JSON, with the mesh and morphs it names beside it: see `docs/bodies.md`. `up` and `unit` are for glTF.",
+        "A body: a glTF file (`.glb`, `.gltf`) with a skin, or a JSON rig file, with its mesh and \
+         morphs in the same folder: see `docs/bodies.md`. `up` and `unit` apply to glTF.",
         not_an_expression,
     ),
     function(
@@ -83,10 +109,11 @@ pub(super) const TABLE: &[Row] = &[
             "file",
             Type::Str,
             "none",
-            "The path, relative to the program's folder; `#` and an id at its end choose a person.",
+            "The path, relative to the program's folder; a suffix `#ID` selects a person.",
         )],
         Type::Object("keypoints"),
-        "The joints of a person that a pose detector found, JSON in its own layout, COCO's or MediaPipe's; none without a file.",
+        "A person's joints from a pose detector, JSON in the program's own layout, COCO's or \
+         MediaPipe's; without a file, no joints.",
         not_an_expression,
     ),
     function(
@@ -94,14 +121,15 @@ pub(super) const TABLE: &[Row] = &[
         SECTION,
         SHAPE,
         Type::Object("a solid"),
-        "A Wavefront OBJ mesh, each object or group in it a part, or the default scene of a glTF file (`.glb`, `.gltf`), each node with a mesh a part.",
+        "A Wavefront OBJ mesh, each object or group a part, or the default scene of a glTF file \
+         (`.glb`, `.gltf`), each node with a mesh a part.",
         not_an_expression,
     ),
 ];
 
 fn not_an_expression(a: &Args) -> Result<Value, Fault> {
     let name = &a.builtin.name;
-    let message = format!("{name}: files are read by `data` items only");
+    let message = format!("{name}: only `data` items can read files");
     Err(Fault::new(FaultKind::Other, message).with_hint(format!("write `data d = {name}(\"file\");` at the top level")))
 }
 

@@ -41,7 +41,7 @@ impl Options {
                 Some(name) if has_options(kind) => &*name.node,
                 Some(name) => return Err(fault(format!("{kind} has no option `{}`", name.node))),
                 None if has_options(kind) => {
-                    return Err(fault(format!("{kind} takes one path; options are given by name")));
+                    return Err(fault(format!("{kind} takes one path; give options by name")));
                 }
                 None => return Err(fault(format!("{kind} takes one path"))),
             };
@@ -79,7 +79,7 @@ fn set_frame(frame: &mut (UpAxis, f64), name: &str, value: &Expr) -> Result<bool
         }
         ("unit", ExprKind::Num(x)) => frame.1 = *x,
         ("up", _) => return Err("`up` must be an axis in quotes".into()),
-        ("unit", _) => return Err("`unit` must be a number that is written out".into()),
+        ("unit", _) => return Err("`unit` must be a literal number".into()),
         _ => return Ok(false),
     }
     Ok(true)
@@ -99,11 +99,18 @@ fn set_network(network: &mut NetworkOptions, name: &str, value: &Expr) -> Result
         },
         _ => number(value).map(|x| [x; 3]),
     };
-    let each = || each().ok_or_else(|| format!("`{name}` must be a number or a list of three that are written out"));
+    let each = || {
+        each().ok_or_else(|| {
+            format!(
+                "`{name}` must be a literal number or a list of \
+        three"
+            )
+        })
+    };
     match name {
         "colours" => network.bgr = word(["rgb", "bgr"])?,
         "shows" => network.shows = if word(["contours", "objects"])? { Shows::Objects } else { Shows::Contours },
-        "white" => network.white = number(value).ok_or("`white` must be a number that is written out")?,
+        "white" => network.white = number(value).ok_or("`white` must be a literal number")?,
         "mean" => network.mean = each()?,
         "spread" => network.spread = each()?,
         "logits" => match value.kind {

@@ -22,16 +22,31 @@ pub(super) const TABLE: &[Row] = &[
             arg(
                 "pose",
                 Type::Any,
-                "By joint, in rig order or by name: a placement, a rotation vector, or a record with some of `rotvec`, \
-                 `rotate`, `location`, `scale`; or one array with three numbers of a rotation vector for each joint.",
+                "For each joint, in rig order or by name: a placement, a rotation vector, or a \
+                 record with some of `rotvec`, `rotate`, `location`, `scale`; or one array with a \
+                 rotation vector (three numbers) for each joint.",
             )
             .unit("radians; the mesh's units"),
-            opt("stop_at", Type::Array, "[]", "Joints at which the pull of a location below them ends."),
-            opt("inherit_scale", Type::Bool, "false", "Whether a joint's scale acts on the joints below it."),
+            opt(
+                "stop_at",
+                Type::Array,
+                "[]",
+                "Joints at which the effect of a location further \
+                down the chain ends.",
+            ),
+            opt(
+                "inherit_scale",
+                Type::Bool,
+                "false",
+                "Whether a joint's scale also applies to \
+                its child joints.",
+            ),
         ],
         SOLID,
-        "The armature's mesh in a pose: M[j] = M[parent] T(head + d) R S T(-head). A location is a handle that turns the \
-         joint's ancestors, up to the next of `stop_at`, by equal shares towards it; the rest moves the joint itself.",
+        "The armature's mesh in a pose (linear blend skinning): M[j] = M[parent] T(head + d) R S \
+         T(-head). A location acts as an inverse kinematics handle: it turns the joint's \
+         ancestors, up to the next joint in `stop_at`, by equal amounts towards it; the remainder \
+         moves the joint itself.",
         |a| {
             let body = armature(a)?;
             let rules = Rules { stops: stops(a, body)?, inherit_scale: a.bool_or(3, false)? };
@@ -45,12 +60,18 @@ pub(super) const TABLE: &[Row] = &[
         SECTION,
         &[
             arg("rig", ARMATURE, "The armature."),
-            arg("morphs", Type::Record, "How much of each of its morphs is added: 1 is the morph itself."),
-            opt("cloth", Type::Num, "0", "How far outside the skin the surface lies, along its normals at rest; joints stay.")
-                .unit("the mesh's units"),
+            arg("morphs", Type::Record, "The weight of each morph: 1 is the full morph."),
+            opt(
+                "cloth",
+                Type::Num,
+                "0",
+                "The distance of the surface (clothing) from the skin, \
+                along the normals of the rest pose; joints are unchanged.",
+            )
+            .unit("the mesh's units"),
         ],
         ARMATURE,
-        "The armature with its shape at rest changed by linear offsets, such as `{ tall: 0.5 }`.",
+        "The armature with its rest shape changed by linear morphs, such as `{ tall: 0.5 }`.",
         |a| {
             let body = armature(a)?;
             let Value::Record(amounts) = a.get(1) else { return Err(a.wrong(1, "a record of numbers")) };
@@ -75,11 +96,13 @@ pub(super) const TABLE: &[Row] = &[
             arg(
                 "factors",
                 Type::Record,
-                "By joint: how much longer its bone is, or three numbers for the axes at rest; each above 0.",
+                "For each joint: the stretch factor of its bone, or three factors along the rest \
+                 axes; each above 0.",
             ),
         ],
         ARMATURE,
-        "The armature with bones longer or shorter at rest, such as `{ thigh_l: 1.1 }`; what hangs on them moves along.",
+        "The armature with longer or shorter bones in the rest pose, such as `{ thigh_l: 1.1 }`; \
+         child joints move along.",
         |a| {
             let body = armature(a)?;
             body.stretched(&stretches(a, body)?).map(|b| Value::object(ArmatureValue(Arc::new(b)))).map_err(fault)
@@ -90,19 +113,20 @@ pub(super) const TABLE: &[Row] = &[
         "autorig",
         SECTION,
         &[
-            arg("mesh", SOLID, "The mesh, such as `data m: mesh` has it."),
+            arg("mesh", SOLID, "The mesh, as read by `data m: mesh`."),
             opt(
                 "from",
                 Type::Str,
                 "\"groups\"",
-                "\"groups\": a joint for each object or group of the mesh, called as that is; \"skeleton\": \
-                 `root`, `bone_1`, … through the middle of a closed mesh.",
+                "\"groups\": a joint for each object or group of the mesh, with its name; \
+                 \"skeleton\": `root`, `bone_1`, … along the medial axis of a closed mesh.",
             ),
-            opt("bones", Type::Int, "16", "The most joints of a skeleton, 1 to 256."),
+            opt("bones", Type::Int, "16", "The maximum number of joints of a skeleton, 1 to 256."),
         ],
         ARMATURE,
-        "An armature for a mesh that has none, a tree with the root at the mesh's centre; its joints are landmarks of what \
-         `scene.skin` makes of it. The surface becomes smooth. Made of data alone it is made once.",
+        "An armature for a mesh without one: a tree with its root at the mesh's centre; its \
+         joints are landmarks of the skinned solid from `scene.skin`. The surface is smoothed. If \
+         it depends only on data it is computed once.",
         |a| {
             let solid = a.object::<SolidValue>(0, "a solid")?;
             let mesh = solid.0.to_mesh().map_err(fault)?;
@@ -112,7 +136,7 @@ pub(super) const TABLE: &[Row] = &[
                 _ => autorig::by_groups(&mesh).map_err(|e| {
                     let one = mesh.topology.parts.windows(2).all(|p| p[0] == p[1]);
                     let f = fault(e);
-                    if one { f.with_hint("for a mesh of one piece there is `from = \"skeleton\"`") } else { f }
+                    if one { f.with_hint("for a mesh in one piece use `from = \"skeleton\"`") } else { f }
                 }),
             };
             made.map(|b| Value::object(ArmatureValue(Arc::new(b))))
@@ -212,7 +236,10 @@ fn affine(a: &Args, placement: &AffineValue) -> Result<JointPose, Fault> {
     // Also where a scale is 0 and `off` no number.
     if !(off < 1e-9 && turn.determinant() > 0.0) {
         let name = a.builtin.full_name();
-        return Err(Fault::domain(format!("{name}: a joint's placement must turn and stretch, not shear or mirror")));
+        return Err(Fault::domain(format!(
+            "{name}: a joint's placement may rotate and scale, but \
+            not shear or mirror"
+        )));
     }
     Ok(JointPose { location: placement.0.0.translation, turn: Turn::Matrix(turn), scale })
 }

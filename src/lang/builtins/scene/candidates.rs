@@ -14,18 +14,33 @@ pub(super) const TABLE: &[Row] = &[native(
     "candidates",
     "Finding",
     &[
-        arg("photo", IMAGE, "The photograph; in clean contours without one, what they enclose is found."),
-        opt("most", Type::Int, "20", "How many are given at most, 1 to 64."),
-        opt("size", Type::Int, "128", "The longer side of the picture worked on, 32 to 512; 256 in contours alone.")
-            .unit("pixels"),
-        opt("camera", CAMERA, "the run's", "The camera; without one, that of the run."),
+        arg(
+            "photo",
+            IMAGE,
+            "The photograph; from a contour map alone, the enclosed regions are \
+                             used.",
+        ),
+        opt("most", Type::Int, "20", "The maximum number of candidates, 1 to 64."),
+        opt(
+            "size",
+            Type::Int,
+            "128",
+            "The longer side of the picture that is analysed, 32 to \
+                                       512; 256 for a contour map.",
+        )
+        .unit("pixels"),
+        opt("camera", CAMERA, "the run's", "The camera; by default, that of the run."),
     ],
     Type::Array,
-    "Regions of a photograph that may be objects of revolution, the likeliest first. Each is a record: `score`; `mask`; `axes`, one or two \
-     records, the more symmetric first: `symmetry`, 0 to 1; the ends `foot` and `top`, in the plane that faces the eye at about the distance of \
-     the origin; their distance `length`; the unit vectors `along`, from foot to top, and `toward` the eye, which is at `distance`; `widths`, 24 half \
-     widths from foot to top; `tilts`, 80 angles by which the axis may be turned towards the camera, radians, and `rims`, how much speaks for each of \
-     them, 0 to 1: whether an end, if it is flat, is seen as an ellipse so high. Lengths are in scene units. A function of picture and camera alone, found once.",
+    "Regions of a photograph that may be objects of revolution, the most probable first. Each is \
+     a record: `score`; `mask`; `axes`, one or two records, the more symmetric first: `symmetry`, \
+     0 to 1; the ends `foot` and `top`, in a fronto-parallel plane at about the distance of the \
+     origin; their distance `length`; the unit vectors `along`, from foot to top, and `toward` \
+     the camera, which is at `distance`; `widths`, 24 half-widths from foot to top; `tilts`, 80 \
+     angles by which the axis may be turned towards the camera, radians, and `rims`, the evidence \
+     for each of them, 0 to 1: whether a flat end would appear as an ellipse of that height. \
+     Lengths are in scene units. Depends only on the picture and the camera, and is computed \
+     once.",
     |a| {
         if matches!(a.values.first(), Some(Value::Unit)) {
             return Ok(Value::List(Arc::from([])));

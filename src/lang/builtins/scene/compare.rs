@@ -21,7 +21,7 @@ use std::sync::{Arc, Weak};
 pub(super) const SECTION: &str = "Comparing";
 pub(super) const SEEN: Arg = arg("view", VIEW, "The view.");
 pub(super) const SIZE: Arg =
-    opt("size", Type::Int, "128", "The longer side of the picture that is drawn, 8 to 4096.").unit("pixels");
+    opt("size", Type::Int, "128", "The longer side of the rendered picture, 8 to 4096.").unit("pixels");
 
 pub(super) const TABLE: &[Row] = &[
     native(
@@ -30,15 +30,35 @@ pub(super) const TABLE: &[Row] = &[
         &[
             SEEN,
             SIZE,
-            opt("foreground", Type::Num, "0.75", "The share of rendered contour that has an edge of its own."),
-            opt("sd", Type::Num, "0.4", "The spread of its distance to that edge.").unit("percent of the diagonal"),
-            opt("truncate", Type::Num, "3.3", "From this distance on there is no edge near.")
+            opt(
+                "foreground",
+                Type::Num,
+                "0.75",
+                "The fraction of rendered contour that produces \
+                an observed edge.",
+            ),
+            opt("sd", Type::Num, "0.4", "The standard deviation of its distance to that edge.")
                 .unit("percent of the diagonal"),
-            opt("credit", Type::Num, "2", "How many times over an observed edge pays."),
-            opt("weight", Type::Num, "0.5", "The power of the ratio of two pixels of contour in a picture of 256."),
+            opt("truncate", Type::Num, "3.3", "The distance beyond which an edge is not matched.")
+                .unit("percent of the diagonal"),
+            opt(
+                "credit",
+                Type::Num,
+                "2",
+                "The number of times that one observed edge can be \
+                matched.",
+            ),
+            opt(
+                "weight",
+                Type::Num,
+                "0.5",
+                "The power of the likelihood ratio per two pixels of \
+                contour, in a picture of 256 pixels.",
+            ),
         ],
         Type::Likelihood,
-        "The likelihood ratio of the observed contours: the object against clutter. The default for photographs.",
+        "The likelihood ratio of the observed contours: object against clutter. The default for \
+         photographs.",
         contour,
     )
     .pull(|_, _, by| Some(by_view(by.clone(), 6))),
@@ -47,21 +67,35 @@ pub(super) const TABLE: &[Row] = &[
         SECTION,
         &[
             SEEN,
-            opt("sigma", Type::Num, "0.4", "The spread of the distance.").unit("percent of the diagonal"),
+            opt("sigma", Type::Num, "0.4", "The standard deviation of the distance.").unit("percent of the diagonal"),
             opt(
                 "mode",
                 Type::Str,
                 "\"mean\"",
-                "\"mean\": one term for the mean distance, as in the paper; \"sum\": one for each percent of contour.",
+                "\"mean\": one term for the mean distance, as in the paper; \"sum\": one term per \
+                 percent of contour.",
             ),
-            opt("symmetric", Type::Bool, "false", "Measures from the observed to the rendered contours too."),
-            opt("truncate", Type::Num, "none", "Distances count as this at most.").unit("percent of the diagonal"),
-            opt("oriented", Type::Num, "none", "The distance that a difference of one radian counts.")
-                .unit("percent of the diagonal"),
+            opt(
+                "symmetric",
+                Type::Bool,
+                "false",
+                "Also measures from the observed to the \
+                rendered contours.",
+            ),
+            opt("truncate", Type::Num, "none", "Truncates distances at this value.").unit("percent of the diagonal"),
+            opt(
+                "oriented",
+                Type::Num,
+                "none",
+                "The distance equivalent to an orientation \
+                difference of one radian.",
+            )
+            .unit("percent of the diagonal"),
             SIZE,
         ],
         Type::Likelihood,
-        "The probabilistic chamfer distance of Kulkarni et al. 2014, section 2(c): no density over photographs.",
+        "The probabilistic chamfer distance of Kulkarni et al. 2014, section 2(c): an \
+         unnormalised score, not a density over photographs.",
         chamfer,
     )
     .pull(|_, _, by| {
@@ -74,8 +108,20 @@ pub(super) const TABLE: &[Row] = &[
         SECTION,
         &[
             SEEN,
-            opt("eps_in", Type::Num, "0.05", "The probability that a pixel of the object is observed as background."),
-            opt("eps_out", Type::Num, "0.05", "The probability that a pixel of the background is observed as object."),
+            opt(
+                "eps_in",
+                Type::Num,
+                "0.05",
+                "The probability that an object pixel is observed as \
+                background.",
+            ),
+            opt(
+                "eps_out",
+                Type::Num,
+                "0.05",
+                "The probability that a background pixel is \
+                observed as object.",
+            ),
             SIZE,
         ],
         Type::Likelihood,
@@ -91,14 +137,15 @@ pub(super) const TABLE: &[Row] = &[
         SECTION,
         &[
             SEEN,
-            opt("sd", Type::Num, "0.05", "The spread of measured depths.").unit("scene units"),
-            opt("outlier", Type::Num, "0.05", "The share of measurements that are off."),
-            opt("near", Type::Num, "0", "The least depth such a measurement can have.").unit("scene units"),
-            opt("far", Type::Num, "100", "The greatest.").unit("scene units"),
+            opt("sd", Type::Num, "0.05", "The standard deviation of measured depths.").unit("scene units"),
+            opt("outlier", Type::Num, "0.05", "The fraction of outliers."),
+            opt("near", Type::Num, "0", "The minimum depth of an outlier.").unit("scene units"),
+            opt("far", Type::Num, "100", "The maximum depth of an outlier.").unit("scene units"),
             SIZE,
         ],
         Type::Likelihood,
-        "The density of an observed depth map: normal about the rendered depth, with outliers; missing pixels say nothing.",
+        "The density of an observed depth map: normal about the rendered depth, with outliers; \
+         missing pixels are ignored.",
         |a| {
             let options = [a.positive_or(1, 0.05)?, a.num_or(2, 0.05)?, a.num_or(3, 0.0)?, a.num_or(4, 100.0)?];
             likelihood(DepthOf { view: view(a)?, size: size(a, 5)?, options })
@@ -111,9 +158,9 @@ pub(super) const TABLE: &[Row] = &[
 pub(super) fn drawn(view: &View, size: u32) -> String {
     let coarse = match view.detail() {
         0.0 => String::new(),
-        d => format!(", contours of meshes that are coarser by up to {d} pixels"),
+        d => format!(", contours from meshes simplified by up to {d} pixels"),
     };
-    format!("drawn at {size} pixels in single precision{coarse}")
+    format!("rendered at {size} pixels in single precision{coarse}")
 }
 
 pub(super) fn likelihood(l: impl Likelihood + 'static) -> Result<Value, Fault> {
@@ -193,7 +240,8 @@ pub(super) fn same_shape((w, h): (u32, u32), view: &View, what: &str) -> Result<
     let (a, b) = (f64::from(w) * f64::from(ch), f64::from(h) * f64::from(cw));
     if (a - b).abs() > 0.03 * a.max(b) {
         return Err(format!(
-            "{what}: the observed picture has {w} x {h} pixels, the camera's {cw} x {ch}: another shape"
+            "{what}: the observed picture has {w} x {h} pixels, but the camera's has {cw} x {ch}: \
+             the aspect ratios differ"
         ));
     }
     Ok(())
@@ -286,7 +334,7 @@ impl Likelihood for ContourOf {
     }
 
     fn approximations(&self) -> Vec<String> {
-        let cut = format!("no edge is looked for beyond {} % of the diagonal", self.options.truncate);
+        let cut = format!("edges beyond {}% of the diagonal are not matched", self.options.truncate);
         vec![drawn(&self.view, self.size), cut]
     }
 }
@@ -342,8 +390,13 @@ impl Likelihood for ChamferOf {
     }
 
     fn approximations(&self) -> Vec<String> {
-        let cut = self.options.truncate.map(|t| format!("distances above {t} % of the diagonal count as that"));
-        let most = format!("of more than {} observed points an even choice is measured", chamfer::MOST_OBSERVED);
+        let cut = self.options.truncate.map(|t| {
+            format!(
+                "distances are truncated at {t}% of the \
+            diagonal"
+            )
+        });
+        let most = format!("of more than {} observed points, an evenly spaced subset is used", chamfer::MOST_OBSERVED);
         [Some(drawn(&self.view, self.size)), cut, self.options.symmetric.then_some(most)]
             .into_iter()
             .flatten()

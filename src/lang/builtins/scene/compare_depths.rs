@@ -18,14 +18,21 @@ pub(super) const TABLE: &[Row] = &[native(
     SECTION,
     &[
         SEEN,
-        arg("scale", Type::Num, "How long a metre is: the size of the body.").unit("scene units"),
-        opt("share", Type::Num, "1", "The share of a depth that the network tells: from one picture it tells too little."),
-        opt("sd", Type::Num, "0.1", "The spread of a good depth.").unit("metres"),
-        opt("outlier", Type::Num, "0.05", "The share of depths that are off."),
+        arg("scale", Type::Num, "The length of a metre: the scale of the body.").unit("scene units"),
+        opt(
+            "share",
+            Type::Num,
+            "1",
+            "The fraction of the true depth that the network reports: \
+                                      from a single picture it underestimates depth.",
+        ),
+        opt("sd", Type::Num, "0.1", "The standard deviation of an inlier depth.").unit("metres"),
+        opt("outlier", Type::Num, "0.05", "The fraction of outliers."),
     ],
     Type::Likelihood,
-    "The density of depths of landmarks from the middle of the hips, as a network tells them from one picture: the last number of each \
-     of a record of points [right, down, away] in metres, such as `metres` of `scene.people`. Names that the scene lacks say nothing.",
+    "The density of landmark depths relative to the mid-hip, as estimated by a network from a \
+     single picture: the third number of each point [right, down, away] in a record, in metres, \
+     such as `metres` of `scene.people`. Names that the scene lacks are ignored.",
     |a| {
         let (sd, outlier) = (a.positive_or(3, 0.1)?, a.num_or(4, 0.05)?);
         let model = RelativeDepthLikelihood::new(sd, outlier).map_err(|_| match sd < 1e9 {
@@ -66,7 +73,9 @@ impl RelativeDepthOf {
     fn hips(&self, landmarks: &[Landmark]) -> Result<[usize; 2], String> {
         let find = |name: &str| landmarks.iter().position(|l| &*l.name == name);
         find("l_hip").zip(find("r_hip")).map(|(l, r)| [l, r]).ok_or_else(|| {
-            "scene.relative_depth: depths are from the middle of the hips, but the scene has no landmarks `l_hip` and `r_hip`".into()
+            "scene.relative_depth: depths are relative to the mid-hip, but the scene has no \
+             landmarks `l_hip` and `r_hip`"
+                .into()
         })
     }
 

@@ -28,30 +28,58 @@ pub(super) const TABLE: &[Row] = &[native(
             "sd",
             Type::Any,
             "1.5",
-            "The spread of a good detection along each axis: a number, or a record of numbers by joint with `other` for the rest.",
+            "The standard deviation of an inlier detection along each axis: a number, or a record \
+             of numbers by joint, with `other` for the rest.",
         )
         .unit("percent of the diagonal"),
-        opt("outlier", Type::Num, "0.05", "The share of detections of full confidence that are off."),
-        opt("offset", Type::Num, "0", "The spread of a joint about where the scene has it, along each axis: bodies differ.")
-            .unit("percent of the diagonal"),
+        opt(
+            "outlier",
+            Type::Num,
+            "0.05",
+            "The fraction of outliers among detections of full \
+            confidence.",
+        ),
+        opt(
+            "offset",
+            Type::Num,
+            "0",
+            "The standard deviation of a joint about its position in \
+                                       the scene, along each axis, since bodies differ.",
+        )
+        .unit("percent of the diagonal"),
         opt(
             "unit",
             Type::Str,
             "\"diagonal\"",
-            "What `sd`, `offset` and `systematic` are given in: \"diagonal\", percent of the picture's; \"torso\", lengths of the detected torso.",
+            "The unit of `sd`, `offset` and `systematic`: \"diagonal\", percent of the picture's \
+             diagonal; \"torso\", lengths of the detected torso.",
         ),
-        opt("confidence", Type::Bool, "true", "Whether a detection that is not sure is the more often off."),
-        opt("misses", Type::Num, "0", "The share of joints that the scene has further off: by 8 times the spread."),
+        opt(
+            "confidence",
+            Type::Bool,
+            "true",
+            "Whether detections of low confidence are more \
+            often outliers.",
+        ),
+        opt(
+            "misses",
+            Type::Num,
+            "0",
+            "The fraction of joints whose position in the scene is \
+                                       further off, with 8 times the standard deviation.",
+        ),
         opt(
             "systematic",
             Type::Num,
             "0",
-            "How far joints are from where detector and scene alike put them: it widens what a run says of joints, not the density.",
+            "The standard deviation of the error common to detector and scene: it widens the \
+             reported uncertainty of joints, not the density.",
         )
         .unit("percent of the diagonal"),
     ],
     Type::Likelihood,
-    "The density of detected joints: each near its landmark or anywhere in the picture; what was not found says nothing.",
+    "The density of detected joints: each near its landmark, or an outlier anywhere in the \
+     picture; undetected joints are ignored.",
     |a| {
         let (outlier, offset, misses) = (a.num_or(2, 0.05)?, a.num_or(3, 0.0)?, a.num_or(6, 0.0)?);
         let systematic = a.num_or(7, 0.0)?;

@@ -11,40 +11,41 @@ pub(super) const TABLE: &[Row] = &[native(
     "edges",
     "Comparing",
     &[
-        arg("image", IMAGE, "The photograph. A ready contour map stays as it is."),
+        arg("image", IMAGE, "The photograph. A contour map is returned unchanged."),
         opt(
             "size",
             Type::Int,
             "256",
-            "The longer side of the picture worked on, 8 to 8192; with a detector from a file 512, at most 2048, and no matter to a \
-             network that has a size of its own.",
+            "The longer side of the picture that is analysed, 8 to 8192; with a detector from a \
+             file 512, at most 2048, and ignored by a network of fixed size.",
         )
         .unit("pixels"),
         opt(
             "smooth",
             Type::Num,
             "1.6",
-            "The spread of the smoothing, 0.3 to 32: more finds fewer and longer contours. With a detector from a file 1, of its map.",
+            "The standard deviation of the smoothing, 0.3 to 32: larger values give fewer and \
+             longer contours. With a detector from a file it smooths the map, by 1.",
         )
         .unit("pixels"),
         opt(
             "strength",
             Type::Num,
             "0.4",
-            "Points weaker than this, of 1, are left out: they are more often texture than outline. With a structured forest 0.1, \
-             with a network 0.5.",
+            "The minimum strength of a contour point, 0 to 1: weaker points are more often \
+             texture than outline. 0.1 with a structured forest, 0.5 with a network.",
         ),
         opt(
             "detector",
             DETECTOR,
             "the run's",
-            "What finds contours, `data d = detector(\"model.yml.gz\");`. Without one that of the run (`--edges`), or the one built \
-             in, from gradients of colour.",
+            "The contour detector, `data d = detector(\"model.yml.gz\");`. By default that of the \
+             run (`--edges`), or the built-in one, which uses colour gradients.",
         ),
     ],
     IMAGE,
-    "The photograph with its contours found by these settings, for comparators. Of one photograph and one setting they are found once; \
-     a detector from a file is asked once for each size.",
+    "The photograph with contours detected by these settings, for comparators. They are detected \
+     once for each photograph and setting; a detector from a file runs once for each size.",
     |a| {
         // A photograph that is not given, where a program is looked at without one.
         if matches!(a.values.first(), Some(Value::Unit)) {

@@ -143,7 +143,7 @@ impl ImageValue {
         match by {
             Detecting::Gradients(detector) => Ok(detector.contours(photo)),
             Detecting::File { detector, size, sigma } => {
-                let Some(file) = &detector.0 else { return Err("the detector is of no file".into()) };
+                let Some(file) = &detector.0 else { return Err("the detector has no file".into()) };
                 let soft =
                     self.soft.get((detector.clone(), *size), |_| file.map(photo, *size).map_err(|e| e.to_string()))?;
                 Ok(file.contours(&soft, photo, *sigma))

@@ -19,22 +19,26 @@ pub(super) const TABLE: &[Row] = &[native(
     "people",
     "Finding",
     &[
-        arg("photo", IMAGE, "The photograph; nobody is found in contours alone."),
+        arg("photo", IMAGE, "The photograph; people cannot be detected in a contour map."),
+        opt("views", Type::Int, "2", "The number of views, 2 to 8: with increasing padding, each also mirrored."),
+        opt("most", Type::Int, "2", "The maximum number of people per view, 1 to 100."),
         opt(
-            "views",
-            Type::Int,
-            "2",
-            "How often it is looked at, 2 to 8: with more and more padding, each time mirrored too.",
-        ),
-        opt("most", Type::Int, "2", "How many people a view is searched for at most, 1 to 100."),
-        opt("near", Type::Array, "[]", "A box [x, y, width, height]: those who fill it best come first.")
-            .unit("pixels"),
+            "near",
+            Type::Array,
+            "[]",
+            "A box [x, y, width, height]: people who fill it best come \
+                                        first.",
+        )
+        .unit("pixels"),
     ],
     Type::Array,
-    "The people in a photograph, the most prominent first. Each is a record: `keypoints`, 33 joints with other places where views \
-     disagree; `landmarks`, by name `at`, `spread` over agreeing views and `visibility`; `metres`, by name [right, down, away] from the \
-     middle of the hips; `mask`; `box`, [x, y, width, height] round all joints, and `torso`, in pixels; `score`; how `sure`, 0 to 1, it is that this is a person; `views` that saw them, \
-     and how many are `agreeing`. A function of the picture alone, found once.",
+    "The people in a photograph, the most prominent first. Each is a record: `keypoints`, 33 \
+     joints, with alternative positions where views disagree; `landmarks`, by name `at`, `spread` \
+     over agreeing views and `visibility`; `metres`, by name [right, down, away] from the \
+     mid-hip; `mask`; `box`, [x, y, width, height] around all joints, and `torso`, in pixels; \
+     `score`; `sure`, the confidence from 0 to 1 that this is a person; `views`, the number of \
+     views in which the person was found, and `agreeing`, how many of them agree. Depends only on \
+     the picture, and is computed once.",
     |a| {
         let image = a.object::<ImageValue>(0, "an image")?;
         let Some(photo) = image.as_photo() else { return Ok(Value::List(Arc::from([]))) };

@@ -23,26 +23,42 @@ pub(super) const TABLE: &[Row] = &[native(
     SECTION,
     &[
         SEEN,
-        opt("power", Type::Num, "0.05", "The power of the term of the whole picture."),
-        opt("tiles", Type::Int, "8", "Tiles along each side of the picture, each with colours of its own; 0: none."),
-        opt("tile_power", Type::Num, "0.1", "The power of the term of the tiles."),
-        opt("colours", Type::Int, "32", "How many colours the photograph is reduced to, 2 to 256."),
+        opt("power", Type::Num, "0.05", "The power of the term for the whole picture."),
+        opt(
+            "tiles",
+            Type::Int,
+            "8",
+            "The number of tiles along each side of the picture, each \
+                                      with its own colour distribution; 0: none.",
+        ),
+        opt("tile_power", Type::Num, "0.1", "The power of the term for the tiles."),
+        opt(
+            "colours",
+            Type::Int,
+            "32",
+            "The number of colours the photograph is reduced to, 2 to \
+            256.",
+        ),
         opt(
             "groups",
             Type::Str,
             "\"silhouette\"",
-            "What has colours of its own beside the background: \"silhouette\": the object; \"parts\": each of its parts, from the 15th on together.",
+            "The regions with their own colour distribution, besides the background: \
+             \"silhouette\": the object; \"parts\": each of its parts, with all from the 15th on \
+             as one.",
         ),
         opt(
             "shading",
             Type::Num,
             "0",
-            "The power of the term that asks whether brightness follows the normals; 0: off.",
+            "The power of the term for shading, whether brightness follows the normals; 0: off.",
         ),
         SIZE,
     ],
     Type::Likelihood,
-    "The likelihood ratio of the photograph's colours: inside and outside told apart, against one background. A probability of pictures in few colours only with a power of 1 for one term, 0 for the others.",
+    "The likelihood ratio of the photograph's colours: separate distributions inside and outside, \
+     against a single background. It is a normalised probability (of the colour-reduced picture) \
+     only if one term has power 1 and the others 0.",
     region,
 )
 .pull(|_, _, by| Some(by_view(by.clone(), 7)))];

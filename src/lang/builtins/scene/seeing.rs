@@ -21,15 +21,23 @@ pub(super) const TABLE: &[Row] = &[
         "camera",
         SECTION,
         &[
-            opt("position", Type::Array, "[0, 0, 8]", "Where it stands.").unit("scene units"),
-            opt("look_at", Type::Array, "[0, 0, 0]", "A point in the middle of its picture.").unit("scene units"),
-            opt("up", Type::Array, "[0, 1, 0]", "A direction that points up in its picture."),
+            opt("position", Type::Array, "[0, 0, 8]", "The position of the camera.").unit("scene units"),
+            opt(
+                "look_at",
+                Type::Array,
+                "[0, 0, 0]",
+                "The point it looks at, at the centre of the \
+                picture.",
+            )
+            .unit("scene units"),
+            opt("up", Type::Array, "[0, 1, 0]", "The direction that points up in the picture."),
             opt("focal", Type::Num, "1.818", "The focal length as a multiple of the picture's longer side."),
-            opt("width", Type::Int, "256", "The width of its picture.").unit("pixels"),
-            opt("height", Type::Int, "256", "The height of its picture.").unit("pixels"),
+            opt("width", Type::Int, "256", "The width of the picture.").unit("pixels"),
+            opt("height", Type::Int, "256", "The height of the picture.").unit("pixels"),
         ],
         CAMERA,
-        "A pinhole camera. Without one, a view uses the camera of the run: `--camera`, or the default view.",
+        "A pinhole camera. By default a view uses the camera of the run: `--camera`, or the \
+         default view.",
         |a| {
             let eye = vector(a, 0, DVec3::new(0.0, 0.0, 8.0))?;
             let target = vector(a, 1, DVec3::ZERO)?;
@@ -40,7 +48,10 @@ pub(super) const TABLE: &[Row] = &[
             let forward = (target - eye).try_normalize();
             let right = forward.and_then(|f| f.cross(up).try_normalize());
             let (Some(forward), Some(right)) = (forward, right) else {
-                return Err(Fault::domain("scene.camera: it must look somewhere, and not along `up`"));
+                return Err(Fault::domain(
+                    "scene.camera: the viewing direction must not be zero or \
+                    parallel to `up`",
+                ));
             };
             let projection = Projection::Pinhole {
                 focal_px: focal * f64::from(width.max(height)),
@@ -55,19 +66,20 @@ pub(super) const TABLE: &[Row] = &[
         "render",
         SECTION,
         &[
-            arg("solid", SOLID, "What is seen."),
-            opt("camera", CAMERA, "the run's", "The camera; without one, that of the run."),
+            arg("solid", SOLID, "The solid to view."),
+            opt("camera", CAMERA, "the run's", "The camera; by default, that of the run."),
             opt(
                 "detail",
                 Type::Num,
                 "0",
-                "How far contours and silhouettes may be off, to draw meshes coarser than they are, each as its size in the picture \
-                 allows; 0 draws them as they are.",
+                "Level of detail: the tolerated error of contours and silhouettes, so that meshes \
+                 can be simplified as far as their size in the picture allows; 0 draws the full \
+                 meshes.",
             )
             .unit("pixels"),
         ],
         VIEW,
-        "A solid before a camera. Nothing is drawn before a likelihood or a report looks.",
+        "A solid seen by a camera. It is rendered only when a likelihood or report needs it.",
         |a| {
             let solid = a.object::<SolidValue>(0, "a solid")?;
             let camera = match a.given(1) {
@@ -88,11 +100,13 @@ pub(super) const TABLE: &[Row] = &[
         SECTION,
         &[arg("view", VIEW, "The view.")],
         Type::Array,
-        "How far the picture of a solid reaches: left, top, right and bottom of all its vertices, as fractions of the picture's sides, so \
-         that below 0 and above 1 is out of the picture. Infinite if it reaches behind the camera, or has no vertex.",
+        "The bounding box of a solid in the picture: left, top, right and bottom of all its \
+         vertices, as fractions of the picture's sides, so that values below 0 or above 1 are \
+         outside the picture. Infinite if it extends behind the camera, or has no vertices.",
         |a| {
             let view = a.object::<ViewValue>(0, "a view")?;
-            let (camera, mut b) = (view.0.camera(), [f64::INFINITY, f64::INFINITY, f64::NEG_INFINITY, f64::NEG_INFINITY]);
+            let (camera, mut b) =
+                (view.0.camera(), [f64::INFINITY, f64::INFINITY, f64::NEG_INFINITY, f64::NEG_INFINITY]);
             for v in view.0.solid().vertices() {
                 let (x, y, depth) = camera.project(v);
                 if depth.is_nan() || depth <= Camera::NEAR {

@@ -21,19 +21,27 @@ pub(super) const TABLE: &[Row] = &[
             arg("parts", Type::Any, "A profile `{ y: heights, r: radii }`, or an array of them, from the bottom up.")
                 .unit("scene units"),
             opt("sides", Type::Int, "48", "The number of flat sides, 3 to 1024."),
-            opt("thickness", Type::Num, "0", "Of the wall, for a vessel open at the top; 0 for a full body.")
-                .unit("scene units"),
+            opt(
+                "thickness",
+                Type::Num,
+                "0",
+                "The thickness of the wall, for a vessel open at the \
+                top; 0 for a solid body.",
+            )
+            .unit("scene units"),
             opt("caps", Type::Str, "\"both\"", "Which ends are closed: \"both\", \"bottom\", \"top\" or \"none\"."),
             opt(
                 "floor",
                 Type::Num,
                 "0",
-                "How high a vessel's floor, or what fills it, is above the lower end: as its wall is thick at least.",
+                "The height of a vessel's floor, or of its contents, above the lower end: at \
+                 least the wall thickness.",
             )
             .unit("scene units"),
         ],
         SOLID,
-        "Profiles stacked and swept round the y axis; a step from one to the next is closed by a ring.",
+        "A surface of revolution: profiles stacked and swept around the y axis; a step from one \
+         profile to the next is closed by a ring.",
         |a| {
             let Turned { profiles, sides, wall, caps } = turned(a)?;
             Solid::lathe(&profiles, sides, wall, caps).map(solid).map_err(fault)
@@ -48,7 +56,7 @@ pub(super) const TABLE: &[Row] = &[
             opt("sides", Type::Int, "32", "The number of meridians, 4 to 1024."),
         ],
         SOLID,
-        "A sphere round the origin.",
+        "A sphere centred at the origin.",
         |a| {
             let sides = if a.given(1) { a.int_in(1, 4, 1024)? as u32 } else { 32 };
             Solid::sphere(a.num(0)?, sides).map(solid).map_err(fault)
@@ -58,39 +66,55 @@ pub(super) const TABLE: &[Row] = &[
     native(
         "box",
         SECTION,
-        &[arg("size", Type::Nums, "The three edge lengths, or one for a cube.").unit("scene units")],
+        &[arg("size", Type::Nums, "The three edge lengths, or one number for a cube.").unit("scene units")],
         SOLID,
-        "A box round the origin.",
+        "A box centred at the origin.",
         |a| cuboid(vector(a, 0, DVec3::ONE)?).map(|m| solid(Solid::new(Arc::new(m)))).map_err(fault),
     )
     .pull(shape_pulls::cuboid),
-    native("group", SECTION, &[arg("solids", Type::Array, "The solids.")], SOLID, "Several solids as one.", |a| {
-        let n = a.get(0).len().unwrap_or(0);
-        let members = (0..n).map(|i| {
-            let v = a.get(0).element(i).unwrap_or_default();
-            v.downcast::<SolidValue>().map(|s| s.0.clone()).ok_or_else(|| a.element_wrong(0, "an array of solids", &v))
-        });
-        let members = members.collect::<Result<Vec<_>, _>>()?;
-        if members.is_empty() {
-            return Err(a.wrong(0, "an array of solids"));
-        }
-        let count: usize = members.iter().map(Solid::mesh_count).sum();
-        if count > MOST_MESHES {
-            let message = format!("scene.group: a group of {count} meshes; at most {MOST_MESHES}");
-            return Err(Fault::new(FaultKind::Limit, message));
-        }
-        Ok(Value::object(SolidValue(Solid::group(&members))))
-    })
+    native(
+        "group",
+        SECTION,
+        &[arg("solids", Type::Array, "The solids.")],
+        SOLID,
+        "Several solids \
+        combined into one.",
+        |a| {
+            let n = a.get(0).len().unwrap_or(0);
+            let members = (0..n).map(|i| {
+                let v = a.get(0).element(i).unwrap_or_default();
+                v.downcast::<SolidValue>()
+                    .map(|s| s.0.clone())
+                    .ok_or_else(|| a.element_wrong(0, "an array of solids", &v))
+            });
+            let members = members.collect::<Result<Vec<_>, _>>()?;
+            if members.is_empty() {
+                return Err(a.wrong(0, "an array of solids"));
+            }
+            let count: usize = members.iter().map(Solid::mesh_count).sum();
+            if count > MOST_MESHES {
+                let message = format!("scene.group: a group of {count} meshes; at most {MOST_MESHES}");
+                return Err(Fault::new(FaultKind::Limit, message));
+            }
+            Ok(Value::object(SolidValue(Solid::group(&members))))
+        },
+    )
     .pull(shape_pulls::group),
     native(
         "centred",
         SECTION,
         &[
             arg("solid", SOLID, "A solid."),
-            opt("fit", Type::Bool, "false", "Also scales it so that the longest edge of its box is 2."),
+            opt(
+                "fit",
+                Type::Bool,
+                "false",
+                "Also scales it so that the longest edge of its \
+                bounding box is 2.",
+            ),
         ],
         SOLID,
-        "Moved so that the centre of its box is the origin.",
+        "The solid moved so that the centre of its bounding box is at the origin.",
         |a| {
             let s = a.object::<SolidValue>(0, "a solid")?;
             Ok(Value::object(SolidValue(s.0.centred(a.bool_or(1, false)?))))
@@ -102,10 +126,11 @@ pub(super) const TABLE: &[Row] = &[
         SECTION,
         &[
             arg("solid", SOLID, "A solid."),
-            arg("points", Type::Record, "Names and places, as in `{ tip: [0, 2, 0] }`.").unit("scene units"),
+            arg("points", Type::Record, "Names and positions, as in `{ tip: [0, 2, 0] }`.").unit("scene units"),
         ],
         SOLID,
-        "The solid with named points that go where it goes, in place of those it had; `solid.landmarks` reads them.",
+        "The solid with named points that move with it, replacing those it had; `solid.landmarks` \
+         returns them.",
         |a| {
             let s = a.object::<SolidValue>(0, "a solid")?;
             let point = |(name, v): (&Arc<str>, &Value)| match v {
@@ -126,12 +151,13 @@ pub(super) const TABLE: &[Row] = &[
         "affine",
         SECTION,
         &[
-            opt("translate", Type::Array, "[0, 0, 0]", "The shift.").unit("scene units"),
-            opt("rotate", Type::Array, "[0, 0, 0]", "The turns round x, then y, then z.").unit("radians"),
-            opt("scale", Type::Nums, "1", "The sizes along the axes, or one for all."),
+            opt("translate", Type::Array, "[0, 0, 0]", "The translation.").unit("scene units"),
+            opt("rotate", Type::Array, "[0, 0, 0]", "The rotations about x, then y, then z.").unit("radians"),
+            opt("scale", Type::Nums, "1", "The scale factors along the axes, or one for all."),
         ],
         AFFINE,
-        "A placement p' = T Rz Ry Rx S p; `placement * solid` puts a solid there, and placements multiply.",
+        "An affine transformation (placement) p' = T Rz Ry Rx S p; `placement * solid` applies it \
+         to a solid, and placements can be multiplied.",
         |a| {
             let placed = Affine::new(vector(a, 0, DVec3::ZERO)?, vector(a, 1, DVec3::ZERO)?, vector(a, 2, DVec3::ONE)?);
             if !placed.is_finite() {

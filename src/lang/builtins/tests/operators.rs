@@ -99,13 +99,17 @@ fn ranges_leave_out_their_end() {
     assert_eq!(fails("..", &[num(0.0), "a".into()]), "`..` needs whole numbers, got a string");
     assert_eq!(
         fails("..", &[num(0.0), num(1e9)]),
-        "..: an array of 1000000000 elements is too long (at most 10000000 are made in one go)"
+        "..: an array of 1000000000 elements is too long (at most 10000000 can be made in one call)"
     );
 }
 
 #[test]
 fn errors_name_what_stands_at_the_sides() {
-    assert_eq!(fails("+", &[arr(&[1.0; 3]), arr(&[1.0; 4])]), "+: an array of 3 and an array of 4 do not go together");
+    assert_eq!(
+        fails("+", &[arr(&[1.0; 3]), arr(&[1.0; 4])]),
+        "+: arrays of lengths 3 and 4 do \
+        not match"
+    );
     assert_eq!(
         fails("+", &["a".into(), num(1.0)]),
         "`+` needs numbers or strings, got a string and a number (`str(x)` makes a string of a number)"
