@@ -526,6 +526,10 @@ impl Graph {
             let frame = &self.frames[self.nodes[n as usize].frame as usize];
             (code.blocks[frame.block as usize].spans[(n - frame.base) as usize], self.address_near(code, n))
         };
+        // A choice outside of its support, such as a label beyond the number of groups: the state has density zero, whatever it
+        // is an index of. What depends on a choice is evaluated after it is scored.
+        let is_impossible = kind == FaultKind::Index && self.prior.value() == f64::NEG_INFINITY;
+        let kind = if is_impossible { FaultKind::Domain } else { kind };
         Box::new(RunError { kind, message, span, address, calls, hint })
     }
 }
