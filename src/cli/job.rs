@@ -11,6 +11,7 @@ use super::reopened::{TRACES, arguments};
 use super::{Failure, edges, files, given, people, plain};
 use pcadlang::bank::BankFiles;
 use pcadlang::infer::draws::{KernelStats, MOST_POINTS, Sink, SiteStats};
+use pcadlang::infer::stuck_structure;
 use pcadlang::infer::{BestSoFar, BestState, ChainResult, Evidence, KeptTraces, Progress, Watch, Watches};
 use pcadlang::lang::{self, builtins::scene::ImageValue};
 use pcadlang::report::html::{MeshData, Page, page};
@@ -337,7 +338,8 @@ fn fill(
     }
     widen(&mut draws);
     let points = chains.first().map_or_else(Vec::new, |c| c.last.points(MOST_POINTS));
-    let zarr = zarr::write(dir.path(), &draws, &points);
+    let step_sizes = chains.iter().map(|c| c.kernels.iter().find_map(|k| k.step_size)).collect();
+    let zarr = zarr::write(dir.path(), &draws, &step_sizes, &points);
     zarr.map_err(|e| plain(format!("{}: {e}; earlier output is kept", dir.file(zarr::ZARR).display())))?;
     let quantities = quantities(&draws);
     let every = draws.iter().map(|d| d.every).max().unwrap_or(1);
@@ -350,6 +352,7 @@ fn fill(
     }
     let approximate = approximate(job, &chains);
     let sites = SiteStats::total(chains.iter().flat_map(|c| &c.sites));
+    warnings.extend(chains.first().and_then(|c| structure_warning(&c.last, &sites)));
     let places = best_of_each(&modes, &best);
     let best = best.state();
     let mut drawn = show_best(dir, s.seed, model, best.as_deref(), &chains, ready.photo())?;
@@ -394,6 +397,19 @@ fn fill(
         seconds: elapsed,
         interrupted,
     })
+}
+
+/// What is to be said of choices that decide how many others there are, and never moved.
+fn structure_warning(state: &pcadlang::trace::Trace, sites: &[SiteStats]) -> Option<String> {
+    let stuck = stuck_structure(state, sites);
+    let (address, rate) = stuck.first()?;
+    let more = if stuck.len() > 1 { format!(" (and {} others)", stuck.len() - 1) } else { String::new() };
+    Some(format!(
+        "{address}{more} decides which other choices exist, and {:.1}% of its proposals were accepted, so \
+         the number of components hardly changes; marginalise their labels, as in `observe mixture(map(fn(m) {{ 1 / k }}, mu), \
+         map(fn(m) {{ normal(m, sd) }}, mu)) = ys;` (guide, chapter 7)",
+        100.0 * rate
+    ))
 }
 
 /// Writes the states that are kept so far, one to a line, from time to time until the chains end.

@@ -110,6 +110,9 @@ pub struct KernelStats {
     /// Trajectories on which the energy was not kept (Hamiltonian kernels).
     #[serde(default)]
     pub divergent: u64,
+    /// The step size after warm-up (Hamiltonian kernels): of several chains the mean.
+    #[serde(default, skip_serializing_if = "Option::is_none")]
+    pub step_size: Option<f64>,
     /// The log of the evidence, from kernels that estimate it: of several chains that of the mean estimate.
     #[serde(default, skip_serializing_if = "Option::is_none")]
     pub log_evidence: Option<f64>,
@@ -180,6 +183,9 @@ impl KernelStats {
             let estimates: Vec<f64> = same.filter_map(|s| s.log_evidence).collect();
             let mean = || crate::num::log_sum_exp(&estimates) - libm::log(estimates.len() as f64);
             t.log_evidence = (!estimates.is_empty()).then(mean);
+            let sizes: Vec<f64> = all.iter().filter(|s| s.name == t.name).filter_map(|s| s.step_size).collect();
+            let n = sizes.len() as f64;
+            t.step_size = (n > 0.0).then(|| sizes.iter().sum::<f64>() / n);
         }
         sum.into_values().collect()
     }

@@ -111,6 +111,11 @@ pub trait Kernel: Send {
         None
     }
 
+    /// The step size of its trajectories, for Hamiltonian kernels.
+    fn step_size(&self) -> Option<f64> {
+        None
+    }
+
     /// The log of the evidence (the marginal likelihood), for kernels that estimate it.
     fn log_evidence(&self) -> Option<f64> {
         None

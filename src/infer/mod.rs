@@ -33,6 +33,7 @@ mod resampling;
 mod selection;
 mod sites;
 mod state;
+mod structure;
 mod watches;
 
 use crate::platform::threads as parallel;
@@ -68,5 +69,7 @@ pub use plan::{ChainError, ChainResult, Checkpoint, Progress, RunOptions, Watch}
 pub use selection::selected;
 pub use state::StateError;
 pub(crate) use state::{pack, unpack};
+#[doc(hidden)]
+pub use structure::stuck_structure;
 #[doc(hidden)]
 pub use watches::Watches;

@@ -14,6 +14,9 @@ use std::path::{Path, PathBuf};
 /// The name of the folder in a run's folder.
 pub const ZARR: &str = "inference.zarr";
 
+/// What is known of each chain beside its draws, in the same order: the step size of its Hamiltonian kernel, if it has one.
+pub type StepSizes = Vec<Option<f64>>;
+
 /// An observed value: its name, and its number; NaN of what is none.
 pub type Point = (String, f64);
 
@@ -37,19 +40,27 @@ struct Array {
 ///
 /// # Errors
 /// If it cannot be written.
-pub fn write(dir: &Path, chains: &[ChainDraws], points: &[Point]) -> io::Result<()> {
+pub fn write(dir: &Path, chains: &[ChainDraws], step_sizes: &StepSizes, points: &[Point]) -> io::Result<()> {
     let (place, partial) = (dir.join(ZARR), dir.join(format!(".{ZARR}.partial")));
     remove(&partial)?;
     std::fs::create_dir_all(&partial)?;
     let mut store = Store { dir: partial.clone(), metadata: Map::new() };
     store.put(".zgroup", json!({ "zarr_format": 2 }))?;
-    let chains: Vec<&ChainDraws> = chains.iter().filter(|c| !c.rows.is_empty()).collect();
+    let known = step_sizes.iter().copied().chain(std::iter::repeat(None));
+    let (chains, step_sizes): (Vec<&ChainDraws>, Vec<Option<f64>>) =
+        chains.iter().zip(known).filter(|(c, _)| !c.rows.is_empty()).unzip();
     let draws = chains.iter().map(|c| c.rows.len()).min().unwrap_or(0);
     let rows: Vec<&DrawRow> = chains.iter().flat_map(|c| &c.rows[..draws]).collect();
     let dims = vec![("chain".to_owned(), chains.len()), ("draw".to_owned(), draws)];
     let columns = chains.first().map_or(&[][..], |c| &c.columns);
     store.group("posterior", posterior(columns, &rows, &dims))?;
-    store.group("sample_stats", sample_stats(&rows, &dims))?;
+    let mut stats = sample_stats(&rows, &dims);
+    if step_sizes.iter().any(Option::is_some) {
+        let each = step_sizes.iter().flat_map(|s| std::iter::repeat_n(s.unwrap_or(f64::NAN), draws));
+        let numbers = Numbers::Floats(each.collect());
+        stats.push(Array { name: "step_size".into(), dims: dims.clone(), numbers });
+    }
+    store.group("sample_stats", stats)?;
     if let Some((at, n)) = place_of(columns, POINTWISE).filter(|(_, n)| *n == points.len()) {
         let observation = vec![("observation".to_owned(), n)];
         let all = |d: &[(String, usize)]| d.iter().chain(&observation).cloned().collect::<Vec<_>>();

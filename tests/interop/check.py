@@ -59,6 +59,8 @@ def check(run):
         if len(table) == 0:
             sys.exit(f"{run}: an empty summary")
         az.plot_trace(data, var_names=names[:3])
+    if run.endswith("/line") and not (stats["step_size"].values > 0).all():
+        sys.exit(f"{run}: no step sizes of NUTS")
     loo = az.loo(store)
     total = store.log_likelihood["observed"].sum("observation").values
     np.testing.assert_allclose(total, stats["log_likelihood_sum"].values, rtol=1e-9, atol=1e-9)

@@ -23,6 +23,7 @@ trap 'rm -rf "$out"' EXIT
 "$PCADLANG" run human.pcad --observe examples/images/skier.jpg --seed 1 --time 10s --quiet --out "$out/human"
 "$PCADLANG" run lathe.pcad --observe examples/images/coffee_cup.png --seed 1 --time 10s --quiet --out "$out/lathe"
 "$PCADLANG" run linreg.pcad --seed 1 --quiet --out "$out/linreg"
+"$PCADLANG" run tests/interop/line.pcad --seed 1 --quiet --out "$out/line"
 "$PCADLANG" run tests/interop/parts.pcad --seed 1 --quiet --out "$out/parts"
 "$PCADLANG" run tests/interop/parts.pcad --seed 1 --time 1s --quiet --out "$out/timed"
-MPLBACKEND=Agg "$venv/bin/python" tests/interop/check.py "$out"/human "$out"/lathe "$out"/linreg "$out"/parts "$out"/timed
+MPLBACKEND=Agg "$venv/bin/python" tests/interop/check.py "$out"/human "$out"/lathe "$out"/linreg "$out"/line "$out"/parts "$out"/timed

@@ -47,7 +47,9 @@ pub(super) struct Instance {
 impl Instance {
     fn into_stats(self) -> KernelStats {
         match self.kernel {
-            Some(kernel) => KernelStats { log_evidence: kernel.log_evidence(), ..self.stats },
+            Some(kernel) => {
+                KernelStats { log_evidence: kernel.log_evidence(), step_size: kernel.step_size(), ..self.stats }
+            }
             None => self.stats,
         }
     }

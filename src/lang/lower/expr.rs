@@ -5,6 +5,7 @@ use super::types::shown;
 use super::{AddHint, Lowerer, Typed};
 use crate::lang::builtins::{Kind, Type};
 use crate::lang::code::{BlockKind, Op, Operand};
+use crate::lang::index::index_value;
 use crate::lang::value::{Closure, Value};
 use crate::syntax::ast::{BinaryOp, Body, Expr, ExprKind, Lambda, Name, UnaryOp};
 use crate::syntax::print_expr;
@@ -176,6 +177,22 @@ impl Lowerer<'_> {
         value
     }
 
+    /// A field of what is known before a run, such as a column of a file: where it is read in any case, it must be there.
+    fn check_field(&mut self, base: Operand, field: &Name) {
+        let always = |s: &Scope| matches!(s.kind, ScopeKind::Root | ScopeKind::Loop { .. });
+        let Operand::Const(i) = base else { return };
+        if !self.scopes.iter().all(always) {
+            return;
+        }
+        let key = Value::Str(Arc::clone(&field.node));
+        if let Err(fault) = index_value(self.code.const_value(i), &key) {
+            let e = self.error(fault.message, field.span, "not a field of it");
+            if let Some(hint) = fault.hint {
+                e.hint_also(hint);
+            }
+        }
+    }
+
     fn field(&mut self, e: &Expr, base: &Expr, field: &Name) -> Typed {
         if let ExprKind::Var(ns) = &base.kind
             && self.lookup(ns).is_none()
@@ -200,6 +217,7 @@ impl Lowerer<'_> {
             }
             return self.nothing();
         }
+        self.check_field(value.at, field);
         let key = self.constant(Value::Str(Arc::clone(&field.node)));
         self.op(Op::Index { base: value.at, keys: [key.at].into() }, Type::Any, e.span)
     }

@@ -105,6 +105,12 @@ impl Adaptation {
         Ok(if adapting || self.averaged == 0.0 { self.step } else { self.averaged })
     }
 
+    /// The step size after warm-up, if there is one yet.
+    pub fn step_size(&self) -> Option<f64> {
+        let learnt = if self.averaged == 0.0 { self.step } else { self.averaged };
+        self.fixed.or(Some(learnt)).filter(|s| *s > 0.0)
+    }
+
     /// Learns from a transition: its mean acceptance and where it ended.
     pub fn learn(&mut self, acceptance: f64, y: &[f64]) {
         self.rounds += 1.0;

@@ -89,6 +89,10 @@ impl<T: Trajectory + Send> Kernel for Hamiltonian<T> {
         self.trajectory.name().into()
     }
 
+    fn step_size(&self) -> Option<f64> {
+        self.adaptation.step_size()
+    }
+
     fn save(&self, trace: &Trace) -> Vec<u8> {
         pack(&(&self.adaptation, self.memory.habits(trace)))
     }
