@@ -281,3 +281,66 @@ fn what_is_outside_and_what_is_replaced_is_said() {
     assert!(beyond.err.contains("note: replacing the earlier run in out"), "{}", beyond.err);
     f.succeeds(&["run", "ball.pcad", "--chains", "2", "--out", "fresh"]);
 }
+
+/// What a program draws by name is in the table and the files, under the names that the program has.
+#[test]
+fn what_is_drawn_by_name_is_recorded() {
+    let f = Folder::new("drawn-by-name");
+    let program = "let y = [0.1, 0.5, 0.9];
+        z[0] ~ normal(0, 1);
+        for t in 1 .. 3 { z[t] ~ normal(z[t - 1], 0.5); observe normal(z[t], 0.3) = y[t]; }
+        w ~ normal(z[2], 1);";
+    f.write("walk.pcad", program);
+    let done = f.succeeds(&["run", "walk.pcad", "--steps", "200", "--warmup", "100", "--out", "walk"]);
+    for name in ["z[0] ", "z[1] ", "z[2] ", "w "] {
+        assert!(done.out.lines().any(|l| l.starts_with(name)), "{name}: {}", done.out);
+    }
+    let (names, _) = chain(&f, "walk/chain-1.csv");
+    assert!(names.contains("z.1,z.2,z.3,w,log_lik.1"), "{names}");
+    // One address for each element, wherever it is drawn; two draws of one element are found.
+    let all = f.read("walk/best.trace.json");
+    assert!(!all.contains("z#2"), "{all}");
+    f.write("twice.pcad", format!("{program} for t in 0 .. 2 {{ z[t] ~ normal(0, 1); }}"));
+    f.refuses(&["run", "twice.pcad"], "is drawn twice");
+}
+
+/// A number of components with a label for each point: it samples, and the run says what keeps it from moving.
+#[test]
+fn structure_that_does_not_move_is_named() {
+    let f = Folder::new("structure");
+    let points: Vec<String> =
+        (0..60).map(|i| format!("{:.2}", f64::from(i % 2) * 5.0 + f64::from(i * 37 % 60) / 40.0)).collect();
+    let start = format!(
+        "let ys = [{}]; assume k ~ uniform_discrete(1, 5);
+         assume mu = map(fn(i) {{ m ~ normal(0, 5); m }}, 0 .. k);",
+        points.join(", ")
+    );
+    let labels = "for i in 0 .. 60 { z[i] ~ uniform_discrete(0, k - 1); observe normal(mu[z[i]], 1) = ys[i]; }";
+    let summed = "observe mixture(map(fn(m) { 1 / k }, mu), map(fn(m) { normal(m, 1) }, mu)) = ys;";
+    f.write("labels.pcad", format!("{start} {labels}"));
+    f.write("summed.pcad", format!("{start} {summed}"));
+    let stuck = f.succeeds(&["run", "labels.pcad", "--seed", "1", "--steps", "20000"]);
+    assert!(stuck.out.contains("warning: @k decides which other choices exist"), "{}", stuck.out);
+    assert!(stuck.out.contains("observe mixture(map("), "{}", stuck.out);
+    let moves = f.succeeds(&["run", "summed.pcad", "--seed", "1", "--steps", "20000"]);
+    assert!(!moves.out.contains("decides which other choices"), "{}", moves.out);
+    let k = moves.out.lines().find(|l| l.starts_with("@k ")).expect("the moves of k");
+    let rate: f64 = k.trim_end_matches('%').rsplit(' ').next().unwrap().parse().unwrap();
+    assert!(rate >= 1.0, "{k}");
+}
+
+/// A column that a file lacks is found by `check`, with those that it has.
+#[test]
+fn checks_look_into_files() {
+    let f = Folder::new("checks");
+    f.write("d.csv", "age,height\n1,70\n2,82\n");
+    let with = |column: &str| format!("data d = csv(\"d.csv\"); observe normal(80, 9) = d.{column};");
+    f.write("good.pcad", with("height"));
+    f.write("bad.pcad", with("heigth"));
+    f.write("asks.pcad", "data d = csv(\"d.csv\"); assume x = if has(d, \"z\") { d.z } else { 0 };");
+    f.succeeds(&["check", "good.pcad"]);
+    f.succeeds(&["check", "asks.pcad"]);
+    f.refuses(&["check", "bad.pcad"], "the record has no field `heigth`");
+    f.write("gone.pcad", "data d = csv(\"gone.csv\"); observe normal(80, 9) = d.height;");
+    f.refuses(&["check", "gone.pcad"], "cannot read gone.csv");
+}

@@ -108,7 +108,7 @@ fn an_error_leaves_everything_as_it_was() {
         (":load nowhere", "nowhere.pcad"),
         (":save no/such/folder/x", "no/such/folder/x"),
         (":trce", ":trace"),
-        (":draw @slope", "takes nothing"),
+        (":draw @slope", "takes no arguments"),
         ("sample [1][3]", "3"),
         ("export slope to \"no/such/folder/x.txt\"", "x.txt"),
         ("let fine = 2; sample [1][3];", "3"),
@@ -234,9 +234,9 @@ fn why_names_what_depends_on_a_choice() {
     let mut s = line();
     says(&mut s, ":set @wide true");
     let wide = says(&mut s, ":why @wide");
-    assert!(wide.contains("@noise/n") && wide.contains("may come or go") && wide.contains("@y"), "{wide}");
+    assert!(wide.contains("@noise/n") && wide.contains("may appear or vanish") && wide.contains("@y"), "{wide}");
     let n = says(&mut s, ":why @noise/n");
-    assert!(n.contains("made from @wide") && n.contains("read by noise"), "{n}");
+    assert!(n.contains("depends on @wide") && n.contains("used by noise"), "{n}");
 }
 
 #[test]
@@ -270,7 +270,7 @@ fn inference_in_the_background_leaves_the_state_until_it_is_asked_for() {
     assert!(says(&mut s, ":stop").starts_with("run 2 is the state now"));
     let last = state(&s);
     says(&mut s, ":infer drift(one($continuous)) 1000000000 &");
-    assert_eq!(says(&mut s, ":drop"), "run 3 is dropped\n");
+    assert_eq!(says(&mut s, ":drop"), "run 3 was discarded\n");
     assert_eq!(state(&s), last);
 }
 
@@ -282,7 +282,7 @@ fn what_belongs_to_another_program_is_not_taken_over() {
     says(&mut s, ":wait");
     let before = state(&s);
     let why = refuses(&mut s, ":stop");
-    assert!(why.contains("run 1 is of the program as it was before it changed"), "{why}");
+    assert!(why.contains("the program has changed since run 1 started"), "{why}");
     assert_eq!(state(&s), before);
     // Back at the same program it would fit.
     says(&mut s, ":undo");
@@ -568,7 +568,7 @@ fn impossible_states_are_told() {
     // Old choices that lead where the program has no value are drawn anew.
     says(&mut s, ":set @p 0.01");
     let said = says(&mut s, "assume q ~ normal(0, log(p * 60))");
-    assert!(said.contains("all were drawn anew"), "{said}");
+    assert!(said.contains("all were redrawn from the prior"), "{said}");
 }
 
 #[test]

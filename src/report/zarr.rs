@@ -227,7 +227,7 @@ mod tests {
         let chain = |rows| ChainDraws { columns: columns.clone(), rows, ..ChainDraws::default() };
         let chains = [chain(vec![row(1.0), row(2.0), row(3.0)]), chain(vec![]), chain(vec![row(4.0), row(5.0)])];
         for _ in 0..2 {
-            write(&dir, &chains, &[("y[\u{e4}]".into(), 7.0)]).unwrap();
+            write(&dir, &chains, &vec![Some(0.25), None, Some(0.5)], &[("y[\u{e4}]".into(), 7.0)]).unwrap();
         }
         let read = |name: &str| std::fs::read(dir.join(ZARR).join(name)).unwrap_or_else(|e| panic!("{name}: {e}"));
         let floats =
@@ -238,13 +238,15 @@ mod tests {
         assert_eq!(json("posterior/w/.zarray")["shape"], json!([2, 2, 2]));
         assert_eq!(json("posterior/w/.zattrs")["_ARRAY_DIMENSIONS"], json!(["chain", "draw", "w_dim_0"]));
         assert_eq!(floats("sample_stats/lp/0.0"), [-1.0, -2.0, -4.0, -5.0]);
+        // Each chain's own, and the one without draws is left out.
+        assert_eq!(floats("sample_stats/step_size/0.0"), [0.25, 0.25, 0.5, 0.5]);
         assert_eq!(floats("log_likelihood/observed/0.0.0"), [-0.5; 4]);
         assert_eq!(floats("observed_data/observed/0"), [7.0]);
         assert_eq!(json("log_likelihood/observation/.zarray")["dtype"], "<U4");
         assert_eq!(read("log_likelihood/observation/0")[8..12], 0xe4u32.to_le_bytes());
         assert!(!dir.join(ZARR).join("posterior").join(POINTWISE).exists());
         // Without draws there is nothing in it, and it is no error.
-        write(&dir, &[], &[]).unwrap();
+        write(&dir, &[], &vec![], &[]).unwrap();
         assert!(!dir.join(ZARR).join("log_likelihood").exists());
         std::fs::remove_dir_all(&dir).unwrap();
     }

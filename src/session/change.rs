@@ -51,7 +51,7 @@ impl Session {
         let weight = match self.trace.regenerate(&targets, self.values()) {
             Ok(weight) => weight,
             Err(e) if e.is_recoverable() => {
-                return Ok(Reply::text(format!("rejected: the program has no value there: {}\n", e.message)));
+                return Ok(Reply::text(format!("rejected: the log density is undefined there: {}\n", e.message)));
             }
             Err(e) => return Err(Trouble::run(&self.model, *e)),
         };
@@ -75,7 +75,7 @@ impl Session {
             s += &format!("accepted (log ratio {})\n", signed(weight.log_weight));
         } else {
             self.trace.rollback();
-            s += &format!("rejected (log ratio {}): the state stays\n", signed(weight.log_weight));
+            s += &format!("rejected (log ratio {}): the state is unchanged\n", signed(weight.log_weight));
         }
         Ok(Reply::text(s))
     }

@@ -22,26 +22,26 @@ const fn command(name: &'static str, takes: &'static str, doc: &'static str) -> 
 
 /// All commands, in the order of `:help`.
 pub const COMMANDS: &[Command] = &[
-    command("trace", "[SEL]", "The choices with their values and log densities, or those of a selection"),
-    command("why", "NAME", "What a choice was made from, and what depends on it"),
-    command("flip", "SEL", "Propose other values from the prior, and say what that does and whether it is accepted"),
-    command("set", "NAME VALUE", "Give a param, a choice or an observation another value"),
-    command("draw", "", "Draw everything anew from the prior"),
-    command("undo", "", "Go back to before the last change"),
-    command("redo", "", "Do again what was undone last"),
+    command("trace", "[SEL]", "List choices with values and log densities: all, or a selection"),
+    command("why", "NAME", "Show what a choice depends on, and what depends on it"),
+    command("flip", "SEL", "Propose a new value from the prior; show what changes and whether it is accepted"),
+    command("set", "NAME VALUE", "Change the value of a param, choice or observation"),
+    command("draw", "", "Draw a new state from the prior"),
+    command("undo", "", "Undo the last change"),
+    command("redo", "", "Redo what was undone last"),
     command(
         "infer",
         "[PLAN] [N] [&]",
-        "Run the program's plan, a named one, `{ … }` or a kernel; with & in the background",
+        "Run inference: the program's plan, a named one, `{ … }` or a kernel; & runs it in the background",
     ),
-    command("status", "", "What runs in the background, or ran last"),
-    command("wait", "", "Wait until what runs in the background is done"),
-    command("stop", "", "End what runs in the background and take over its state"),
-    command("drop", "", "End what runs in the background and forget it"),
-    command("plot", "NAME", "Histogram and course of a quantity of the last inference"),
-    command("profile", "", "Times and acceptance of the last inference, by kernel and choice"),
-    command("render", "[NAME] [FILE]", "The picture of the scene, or of a view or solid; into a file that is named"),
-    command("list", "", "The program"),
+    command("status", "", "Show the background run, or the last run"),
+    command("wait", "", "Wait for the background run"),
+    command("stop", "", "Stop the background run and keep its state"),
+    command("drop", "", "Stop the background run and discard it"),
+    command("plot", "NAME", "Histogram and trace plot of a quantity of the last run"),
+    command("profile", "", "Time and acceptance rates of the last run, by kernel and choice"),
+    command("render", "[NAME] [FILE]", "Show a picture of the scene, a view or a solid, or write it to FILE"),
+    command("list", "", "Show the program"),
     command("edit", "", "Edit the program in your editor ($VISUAL or $EDITOR)"),
     command(
         "save",
@@ -53,7 +53,7 @@ pub const COMMANDS: &[Command] = &[
     command("doc", "[NAME]", "Explain a statement, built-in, kernel or command"),
     command("clear", "", "Clear the screen"),
     command("help", "[NAME]", "This list (also ? or help); with a name the same as :doc"),
-    command("quit", "", "Leave (also exit, or Ctrl-D)"),
+    command("quit", "", "Quit (also exit, Ctrl-D)"),
 ];
 
 /// Words that are no expression of the language and that people try, for the commands that they mean.
@@ -73,7 +73,7 @@ impl Session {
         let rest = rest.trim();
         if let Some(c) = COMMANDS.iter().find(|c| c.name == name) {
             if c.takes.is_empty() && !rest.is_empty() {
-                return Err(Trouble::plain(format!("`:{name}` takes nothing, got `{rest}`")));
+                return Err(Trouble::plain(format!("`:{name}` takes no arguments, got `{rest}`")));
             }
             if !c.takes.is_empty() && !c.takes.starts_with('[') && rest.is_empty() {
                 return Err(Trouble::plain(format!("`:{name}` needs {}", c.takes)).hint(c.doc));

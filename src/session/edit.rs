@@ -203,7 +203,7 @@ impl Session {
         let model = self.program.asking(INPUT, text)?.compile()?;
         let mut trace = self.moved_to(&model, &self.trace)?;
         let Some(operand) = model.code().samples.last().copied() else {
-            return Err(Trouble::plain("this is no expression"));
+            return Err(Trouble::plain("this is not an expression"));
         };
         let values = trace.query(&[operand], self.looks()).map_err(|e| Trouble::run(&model, *e))?;
         Ok(values.into_iter().next().unwrap_or_default())

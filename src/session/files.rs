@@ -31,7 +31,7 @@ impl Session {
         let written = self.program.written_as(&program).map_err(|e| {
             let first = e.diagnostics.first().map_or_else(String::new, |d| d.message.clone());
             Trouble::plain(format!("{program} would not load: {first}"))
-                .hint("what it includes is looked for from its own folder: save it there")
+                .hint("its included files are relative to its own folder: save it there")
         })?;
         let saved = self.trace.save(&written.hash());
         let bytes = serde_json::to_vec(&saved).map_err(|e| Trouble::plain(e.to_string()))?;

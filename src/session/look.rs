@@ -61,7 +61,7 @@ impl Session {
             return Ok(found);
         }
         let known: Vec<String> = self.trace.all_targets().iter().map(|t| self.trace.address(*t).to_string()).collect();
-        let trouble = Trouble::plain(format!("`{text}` selects no choice of the trace"));
+        let trouble = Trouble::plain(format!("`{text}` selects no choice in the trace"));
         Err(match nearest(text, known.iter().map(String::as_str)) {
             Some(n) => trouble.hint(format!("did you mean `{n}`?")),
             None if known.is_empty() => trouble.hint("the trace has no choices yet: assume x ~ normal(0, 1)"),

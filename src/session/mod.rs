@@ -192,9 +192,13 @@ impl Session {
         };
         let key = StreamKey::new(self.seed, 0, Purpose::START);
         let (mut impossible, mut failure) = (None, None);
-        for (kept, note) in
-            [(kept, ""), (&[][..], "note: the choices so far lead to no value, so all were drawn anew\n")]
-        {
+        for (kept, note) in [
+            (kept, ""),
+            (
+                &[][..],
+                "note: the log density is undefined for the current choices, so all were redrawn from the prior\n",
+            ),
+        ] {
             for lane in 0..ATTEMPTS {
                 let draws = Draws { key, step: self.clock, lane };
                 match Trace::generate(Arc::clone(&code), kept.iter().cloned(), draws, self.limits.clone()) {
@@ -220,7 +224,7 @@ impl Session {
         }
         match failure {
             Some(e) => Err(Trouble::run(model, *e)),
-            None => Err(Trouble::plain("the program has no value")),
+            None => Err(Trouble::plain("the log density is undefined")),
         }
     }
 

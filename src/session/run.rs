@@ -140,7 +140,7 @@ impl Session {
     fn compiled(&self, block: &str) -> Result<(Arc<[KStmt]>, Arc<Model>), Trouble> {
         let program: Program = self.program.and(INPUT, block)?;
         let model = program.compile()?;
-        let plan = model.last_plan().ok_or_else(|| Trouble::plain("this is no inference block"))?;
+        let plan = model.last_plan().ok_or_else(|| Trouble::plain("this is not an inference block"))?;
         Ok((plan, Arc::new(model)))
     }
 
@@ -240,8 +240,8 @@ impl Session {
         };
         if !Arc::ptr_eq(&run.base, &self.model) {
             self.last = Some(finished);
-            let trouble = Trouble::plain(format!("run {} is of the program as it was before it changed", run.number));
-            return Err(trouble.hint("its state is not taken over; `:plot` and `:profile` show what it did"));
+            let trouble = Trouble::plain(format!("the program has changed since run {} started", run.number));
+            return Err(trouble.hint("its state cannot be used; `:plot` and `:profile` show what it did"));
         }
         let mut last = result.last;
         if !Arc::ptr_eq(&run.model, &self.model) {
@@ -291,7 +291,7 @@ impl Session {
     pub(super) fn drop_background(&mut self) -> Result<Reply, Trouble> {
         let run = self.taken()?;
         run.progress.cancelled.store(true, Ordering::Relaxed);
-        Ok(Reply::text(format!("run {} is dropped\n", run.number)))
+        Ok(Reply::text(format!("run {} was discarded\n", run.number)))
     }
 
     fn taken(&mut self) -> Result<Background, Trouble> {
@@ -324,8 +324,12 @@ impl Session {
         let Some(last) = &self.last else { return Err(Trouble::plain("nothing has run yet").hint(":infer")) };
         let mut text = last.line();
         let rate = (last.steps + last.warmup) as f64 / last.seconds;
-        text +=
-            &format!("{}, {} steps a second\n\n{}", seconds(last.seconds), number(rate), table::kernels(&last.kernels));
+        text += &format!(
+            "{}, {} steps per second\n\n{}",
+            seconds(last.seconds),
+            number(rate),
+            table::kernels(&last.kernels)
+        );
         let sites = table::sites(&last.sites);
         if !sites.is_empty() {
             text += &format!("\n{sites}");
@@ -384,7 +388,7 @@ impl Background {
     fn line(&self) -> String {
         let (s, seen) = (self.status(), self.kept.seen());
         let state = match s.is_done {
-            true => "done; `:stop` takes over its state".to_owned(),
+            true => "done; `:stop` keeps its state".to_owned(),
             false => s.part(),
         };
         let mut line = format!("run {}, {}: {} steps", self.number, self.what, s.steps);

@@ -21,15 +21,15 @@ impl Session {
         let origins = self.trace.origins(*target);
         if !origins.is_empty() {
             let names: Vec<String> = origins.iter().take(ROWS).map(ToString::to_string).collect();
-            s += &format!("made from {}\n{}", names.join(", "), more(origins.len(), "choices"));
+            s += &format!("depends on {}\n{}", names.join(", "), more(origins.len(), "choices"));
         }
         let reach = self.trace.reached_from(*target);
         if !reach.names.is_empty() {
             let names: Vec<&str> = reach.names.iter().map(|n| &**n).collect();
-            s += &format!("read by {}\n", names.join(", "));
+            s += &format!("used by {}\n", names.join(", "));
         }
         if reach.terms.is_empty() {
-            s += "nothing that is scored depends on it in this state\n";
+            s += "no observation or factor depends on it in this state\n";
             return Ok(Reply::text(s));
         }
         let mut rows = vec![["depends on it", "", "log density", ""].map(str::to_owned).to_vec()];
@@ -42,7 +42,7 @@ impl Session {
             let effect = match r.effect {
                 Effect::Scored => "",
                 Effect::Moved => "may move with it",
-                Effect::Structural => "may come or go",
+                Effect::Structural => "may appear or vanish",
             };
             rows.push(vec![r.address.to_string(), what.into(), number(r.log_density), effect.into()]);
         }

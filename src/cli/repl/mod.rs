@@ -143,7 +143,7 @@ impl Front {
             if let Some((number, true)) = background
                 && told != Some(number)
             {
-                print_line!("run {number} is done: `:stop` takes over its state");
+                print_line!("run {number} has finished; `:stop` keeps its state");
                 told = Some(number);
             }
             let leaves = match lines.next(PROMPT).map_err(wrong)? {
@@ -164,7 +164,7 @@ impl Front {
             let background = self.session.borrow().background().map(|(number, _)| number);
             match background.filter(|_| leaves && warned != background) {
                 Some(number) => {
-                    print_line!("run {number} would be lost: `:stop` takes over its state; once more leaves");
+                    print_line!("run {number} would be lost: `:stop` keeps its state; press Ctrl-D again to quit");
                     warned = background;
                 }
                 None if leaves => return Ok(()),
