@@ -184,8 +184,12 @@ impl Lowerer<'_> {
         if !self.scopes.iter().all(always) {
             return;
         }
+        let value = self.code.const_value(i);
+        if !matches!(value, Value::Record(_)) {
+            return;
+        }
         let key = Value::Str(Arc::clone(&field.node));
-        if let Err(fault) = index_value(self.code.const_value(i), &key) {
+        if let Err(fault) = index_value(value, &key) {
             let e = self.error(fault.message, field.span, "not a field of it");
             if let Some(hint) = fault.hint {
                 e.hint_also(hint);
