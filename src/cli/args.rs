@@ -1,16 +1,20 @@
 //! The command line.
 
+mod values;
+
 use super::compare::Compare;
 use super::detect::Detect;
 use super::files::program_name;
 use super::manual::{Completions, Man};
 use super::people::Who;
+use super::report::Report;
 use super::show::Show;
 use clap::builder::{PossibleValuesParser, TypedValueParser};
 use clap::{Args, Parser, Subcommand, ValueHint};
 use pcadlang::tradeoff::Quality;
 use std::path::PathBuf;
 use std::time::Duration;
+use values::{duration, limit, pair};
 
 /// A probabilistic CAD language: Bayesian inference of 3D scenes from photographs.
 #[derive(Debug, Parser)]
@@ -54,6 +58,8 @@ pub enum Command {
     Show(Show),
     /// Compare two runs: their settings, quantities and pictures
     Compare(Compare),
+    /// Make the page of a run anew, `report.html`, from what its folder holds
+    Report(Report),
     /// Print the manual page, or write one for every command
     Man(Man),
 }
@@ -543,40 +549,6 @@ pub enum Graphics {
     File,
 }
 
-fn pair(text: &str) -> Result<(String, String), String> {
-    match text.split_once('=') {
-        Some((name, value)) if !name.trim().is_empty() => Ok((name.trim().to_owned(), value.trim().to_owned())),
-        _ => Err("expected NAME=VALUE".into()),
-    }
-}
-
-fn limit(text: &str) -> Result<(String, u64), String> {
-    let (name, number) = pair(text)?;
-    let number = number.parse().map_err(|_| format!("expected a whole number, got {number}"))?;
-    pcadlang::trace::Limits::default().with(&name, number)?;
-    Ok((name, number))
-}
-
-fn duration(text: &str) -> Result<Duration, String> {
-    let wrong = || "expected a time such as 10s, 2m, 1h or 500ms".to_owned();
-    let at = text.find(|c: char| c.is_ascii_alphabetic()).unwrap_or(text.len());
-    let (number, unit) = text.split_at(at);
-    let x: f64 = number.trim().parse().map_err(|_| wrong())?;
-    let scale = match unit.trim() {
-        "ms" => 1e-3,
-        "s" | "" => 1.0,
-        "m" | "min" => 60.0,
-        "h" => 3600.0,
-        _ => return Err(wrong()),
-    };
-    let seconds = x * scale;
-    if seconds.is_finite() && (0.0..1e9).contains(&seconds) {
-        Ok(Duration::from_secs_f64(seconds))
-    } else {
-        Err(wrong())
-    }
-}
-
 #[cfg(test)]
 mod tests {
     use super::*;
@@ -585,16 +557,5 @@ mod tests {
     #[test]
     fn the_command_line_is_sound() {
         Cli::command().debug_assert();
-        assert_eq!(duration("500ms"), Ok(Duration::from_millis(500)));
-        assert_eq!(duration("1.5m"), Ok(Duration::from_secs(90)));
-        assert_eq!(duration("7"), Ok(Duration::from_secs(7)));
-        assert!(
-            duration("soon").is_err()
-                && duration("-1s").is_err()
-                && duration("1d").is_err()
-                && duration("1e300h").is_err()
-        );
-        assert_eq!(pair("a = 1"), Ok(("a".into(), "1".into())));
-        assert!(pair("a").is_err() && pair("=1").is_err());
     }
 }

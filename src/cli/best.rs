@@ -4,12 +4,13 @@
 
 use super::job::write;
 use super::progress::Ending;
+use super::seen::show_seen;
 use super::{Failure, plain, scene};
 use image::GrayImage;
 use pcadlang::Model;
 use pcadlang::geom::{Mesh, Solid, glb, obj};
 use pcadlang::infer::{BestSoFar, BestState, ChainResult};
-use pcadlang::lang::builtins::scene::ViewValue;
+use pcadlang::lang::builtins::scene::{ImageValue, ViewValue};
 use pcadlang::lang::value::Located;
 use pcadlang::render::{Camera, View};
 use pcadlang::report::pictures::{self, png};
@@ -23,15 +24,9 @@ use std::time::{Duration, Instant};
 /// When the best state is written for the first time.
 const FIRST: Duration = Duration::from_millis(200);
 
-/// What the page shows of the best state.
+/// What is known of the best state once it was drawn.
 #[derive(Default)]
 pub struct Shown {
-    /// Captions and PNGs.
-    pub pictures: Vec<(&'static str, Vec<u8>)>,
-    /// The corners of the mesh.
-    pub positions: Vec<[f32; 3]>,
-    /// The mesh, if there is one.
-    pub mesh: Option<Mesh>,
     /// What is seen.
     pub view: Option<ViewValue>,
     /// The share of the mesh's corners that is in the picture.
@@ -47,7 +42,7 @@ pub fn show_best(
     model: &Model,
     best: Option<&BestState>,
     chains: &[ChainResult],
-    photo: Option<&Photo>,
+    image: Option<&ImageValue>,
 ) -> Result<Shown, Failure> {
     let Some(best) = best else { return Ok(Shown::default()) };
     let draws = scene::predictive(seed, 0);
@@ -56,7 +51,9 @@ pub fn show_best(
     write(dir, "best.trace.json", &saved)?;
     let mut shown = Shown::default();
     if let Some(view) = scene::view(&mut trace, draws, None) {
-        draw(dir, &view, &trace.located(), chains, seed, photo, &mut shown)?;
+        let located = trace.located();
+        draw(dir, &view, &located, chains, seed, image.and_then(ImageValue::as_photo), &mut shown)?;
+        image.map_or(Ok(()), |image| show_seen(dir, image, &located))?;
         shown.view = Some(ViewValue(view));
     }
     for x in model.exports() {
@@ -103,37 +100,18 @@ fn draw(
     if let Some(mask) = GrayImage::from_raw(frame.width, frame.height, bytes) {
         write(dir, "mask.png", &encode(png(&mask))?)?;
     }
-    let large = pictures::picture_size(width, height);
     let mut over = over(view, photo.map(Photo::rgb), (width, height));
     detected(&mut over, located, (width, height));
-    let overlay = encode(png(&over))?;
-    let lines = encode(png(&pictures::contours(frame.width, frame.height, &strokes(&view.contours(size)))))?;
-    write(dir, "overlay.png", &overlay)?;
-    write(dir, "contours.png", &lines)?;
-    if let Some(p) = photo {
-        let resized = image::imageops::resize(p.rgb(), large.0, large.1, image::imageops::FilterType::Triangle);
-        shown.pictures.push(("the photograph", encode(png(&resized))?));
-    }
-    let caption = match located.is_empty() {
-        true => "the best state over it",
-        false => {
-            "the best state over it; the model's joints in yellow, each joined to its \
-                  detected position"
-        }
-    };
-    shown.pictures.push((caption, overlay));
+    let lines = pictures::contours(frame.width, frame.height, &strokes(&view.contours(size)));
+    write(dir, "overlay.png", &encode(png(&over))?)?;
+    write(dir, "contours.png", &encode(png(&lines))?)?;
     let (spread, agreement) = frequency(chains, seed, 128);
-    let spread = encode(png(&spread))?;
     shown.agreement = agreement;
-    write(dir, "uncertainty.png", &spread)?;
-    shown.pictures.push(("the fraction of the chains' last draws that cover each pixel", spread));
+    write(dir, "uncertainty.png", &encode(png(&spread))?)?;
     if let Some(mesh) = mesh(view.solid()) {
         write(dir, "best.obj", obj::write(&mesh).as_bytes())?;
         write(dir, "best.glb", &glb::write(&mesh))?;
         shown.inside = inside(&mesh, camera);
-        let positions: Vec<[f32; 3]> = mesh.positions.iter().map(|p| p.to_array()).collect();
-        shown.positions = positions;
-        shown.mesh = Some(mesh);
     }
     Ok(())
 }

@@ -1,7 +1,7 @@
 //! What an earlier run left in a folder, and whether it is of the same settings.
 
 use super::{Failure, plain};
-use pcadlang::report::{RunDir, RunDirError};
+use pcadlang::report::{RunDir, RunDirError, evaluation};
 use serde_json::{Map, Value};
 use std::path::Path;
 
@@ -29,7 +29,15 @@ pub fn left(folder: &Path) -> Option<Value> {
 /// # Errors
 /// If no run was begun there.
 pub fn run(folder: &Path) -> Result<Value, Failure> {
-    left(folder).ok_or_else(|| plain(RunDirError::NoRun(folder.to_owned()).to_string()))
+    left(folder).ok_or_else(|| {
+        let hint = match folder {
+            _ if !folder.exists() => "there is no such folder",
+            _ if !folder.is_dir() => "it is a file; the folder that it is in may be one of a run",
+            _ if folder.join(evaluation::MARK).is_file() => "an evaluation has a run in each folder of a case",
+            _ => "`pcadlang run` leaves a run in runs/PROG, or in the folder of --out",
+        };
+        Failure::Plain(RunDirError::NoRun(folder.to_owned()).to_string(), Some(hint.into()))
+    })
 }
 
 /// What is another there than in the record of a run; empty if its draws are the same.

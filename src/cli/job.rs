@@ -5,19 +5,19 @@
 use super::args::Job;
 use super::best::{disagreement, keep_best, outside, show_best};
 use super::keypoints::Joints;
+use super::page::{PROGRAM, write_page};
 use super::places::{best_of_each, show_places};
 use super::progress::{self, Ending};
 use super::reopened::{TRACES, arguments};
-use super::{Failure, edges, files, given, people, plain};
+use super::{Failure, date, edges, files, given, people, plain};
 use pcadlang::bank::BankFiles;
 use pcadlang::infer::draws::{KernelStats, MOST_POINTS, Sink, SiteStats};
 use pcadlang::infer::stuck_structure;
 use pcadlang::infer::{BestSoFar, BestState, ChainResult, Evidence, KeptTraces, Progress, Watch, Watches};
 use pcadlang::lang::{self, builtins::scene::ImageValue};
-use pcadlang::report::html::{MeshData, Page, page};
 use pcadlang::report::{
-    ChainDraws, ChainFiles, Memory, Mode, Quantity, RunDir, align, bytes_hash, modes, quantities, seconds, table,
-    text_hash, widen, zarr,
+    ChainDraws, ChainFiles, Memory, Mode, Quantity, RunDir, align, bytes_hash, modes, quantities, table, text_hash,
+    widen, zarr,
 };
 use pcadlang::vision::Photo;
 use pcadlang::{Model, RunOptions};
@@ -28,7 +28,7 @@ use std::sync::{Arc, Mutex, PoisonError, Weak};
 use std::time::{Duration, Instant};
 
 /// The numbers that are kept in memory for the summary, all chains together: 32 MiB.
-const ROOM: usize = 4 << 20;
+pub const ROOM: usize = 4 << 20;
 
 /// A program compiled with what it observes.
 pub struct Ready {
@@ -73,7 +73,12 @@ impl Ready {
 
     /// The photograph, if there is one.
     pub fn photo(&self) -> Option<&Photo> {
-        self.image.as_ref()?.1.downcast::<ImageValue>()?.as_photo()
+        self.image()?.as_photo()
+    }
+
+    /// The photograph with what was found in it, or its contours alone, if there are any.
+    fn image(&self) -> Option<&ImageValue> {
+        self.image.as_ref()?.1.downcast::<ImageValue>()
     }
 }
 
@@ -199,6 +204,7 @@ pub fn record(job: &Job, program_hash: &str, inputs: &str) -> Map<String, Value>
     let record = json!({
         "version": env!("CARGO_PKG_VERSION"),
         "state": "running",
+        "begun": date::now(),
         "program": job.given.program,
         "program_hash": program_hash,
         "inputs_hash": inputs,
@@ -222,12 +228,21 @@ pub fn record(job: &Job, program_hash: &str, inputs: &str) -> Map<String, Value>
 
 /// Writes `run.json`: the record with its state, and more.
 pub fn write_record(dir: &RunDir, record: &Map<String, Value>, state: &str, more: Value) -> Result<(), Failure> {
+    write_run(dir, &recorded(record, state, more))
+}
+
+/// The record with its state, and more.
+fn recorded(record: &Map<String, Value>, state: &str, more: Value) -> Value {
     let mut record = record.clone();
     record.insert("state".into(), json!(state));
     if let Value::Object(more) = more {
         record.extend(more);
     }
-    write(dir, "run.json", &serde_json::to_vec_pretty(&record).unwrap_or_default())
+    Value::Object(record)
+}
+
+fn write_run(dir: &RunDir, run: &Value) -> Result<(), Failure> {
+    write(dir, "run.json", &serde_json::to_vec_pretty(run).unwrap_or_default())
 }
 
 /// Writes a file of a run.
@@ -271,6 +286,7 @@ pub fn perform(
     manner: Manner,
 ) -> Result<Outcome, Failure> {
     write_record(dir, record, "running", json!({}))?;
+    write(dir, PROGRAM, ready.model.text().as_bytes())?;
     fill(job, ready, dir, record, interrupt, manner).inspect_err(|failure| {
         // The error that is told is the first one.
         let _ = record_failure(dir, record, failure, ready.begun.elapsed().as_secs_f64());
@@ -355,8 +371,8 @@ fn fill(
     warnings.extend(chains.first().and_then(|c| structure_warning(&c.last, &sites)));
     let places = best_of_each(&modes, &best);
     let best = best.state();
-    let mut drawn = show_best(dir, s.seed, model, best.as_deref(), &chains, ready.photo())?;
-    show_places(dir, s.seed, model, &places, ready.photo(), &mut drawn)?;
+    let drawn = show_best(dir, s.seed, model, best.as_deref(), &chains, ready.image())?;
+    show_places(dir, s.seed, model, &places, ready.photo())?;
     warnings.extend(disagreement(&drawn));
     warnings.extend(outside(&drawn));
     let summary = json!({
@@ -368,23 +384,12 @@ fn fill(
     if let Some(found) = drawn.view.as_ref().and_then(|v| joints.report(v, &modes, elapsed)) {
         write(dir, "keypoints.json", &serde_json::to_vec_pretty(&found).unwrap_or_default())?;
     }
-    let html = page(&Page {
-        title: &job.given.program,
-        settings: settings(job, model, elapsed),
-        pictures: drawn.pictures,
-        quantities: &quantities,
-        modes: &modes,
-        kernels: &kernels,
-        warnings: &warnings,
-        approximate: &approximate,
-        mesh: drawn.mesh.as_ref().map(|m| MeshData { positions: &drawn.positions, triangles: &m.topology.triangles }),
-        program: model.text(),
-    });
-    write(dir, "report.html", html.as_bytes())?;
     let mut more = counts(&chains, best.as_deref(), &quantities);
     more.extend(drawn.agreement.map(|a| ("agreement".into(), json!(a))));
     more.extend([("sampling_seconds".into(), json!(sampled)), ("seconds".into(), json!(elapsed))]);
-    write_record(dir, record, if interrupted { "interrupted" } else { "done" }, Value::Object(more))?;
+    let run = recorded(record, if interrupted { "interrupted" } else { "done" }, Value::Object(more));
+    write_page(dir, &run, &summary, &quantities)?;
+    write_run(dir, &run)?;
     Ok(Outcome {
         quantities,
         kernels,
@@ -490,19 +495,4 @@ fn sinks(
 /// What is given to observe, as `--observe` has it.
 fn observed(job: &Job) -> impl Iterator<Item = String> {
     job.observe.iter().cloned().chain(job.keypoints.iter().map(|k| format!("keypoints={k}")))
-}
-
-fn settings(job: &Job, model: &Model, elapsed: f64) -> Vec<(&'static str, String)> {
-    let mut all = vec![
-        ("version", env!("CARGO_PKG_VERSION").to_owned()),
-        ("program hash", model.hash().to_owned()),
-        ("seed", job.sampling.seed.to_string()),
-        ("chains", job.sampling.chains().to_string()),
-        ("time", seconds(elapsed)),
-        ("command", format!("pcadlang run {}", super::show::quoted(&arguments(job)))),
-    ];
-    all.extend(job.given.sets.iter().map(|(k, v)| ("set", format!("{k} = {v}"))));
-    all.extend(observed(job).map(|o| ("observe", o)));
-    all.extend(job.given.edges.iter().map(|e| ("edges", e.clone())));
-    all
 }

@@ -9,6 +9,7 @@ mod calibrate;
 mod check;
 mod compare;
 mod contours;
+mod date;
 mod detect;
 mod doc;
 mod earlier;
@@ -22,6 +23,7 @@ mod job;
 mod keypoints;
 mod learn;
 mod manual;
+mod page;
 mod people;
 mod places;
 mod predict;
@@ -29,9 +31,11 @@ mod progress;
 mod quality;
 mod reopened;
 mod repl;
+mod report;
 mod run;
 mod sample;
 mod scene;
+mod seen;
 mod show;
 mod term;
 mod tradeoff;
@@ -101,6 +105,7 @@ pub fn main(cli: Cli) -> ExitCode {
         Command::Man(a) => manual::man(&a),
         Command::Show(a) => show::show(&a),
         Command::Compare(a) => compare::compare(&a),
+        Command::Report(a) => report::report(&a),
     };
     match done {
         Ok(()) => ExitCode::SUCCESS,

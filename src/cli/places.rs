@@ -1,6 +1,5 @@
 //! A picture of each mode that chains are in, where they do not agree: the best state of its chains over the photograph.
 
-use super::best::Shown;
 use super::job::write;
 use super::{Failure, plain, scene};
 use image::RgbImage;
@@ -11,6 +10,7 @@ use pcadlang::report::pictures::{captioned_sheet, png};
 use pcadlang::report::{Mode, RunDir};
 use pcadlang::session::over;
 use pcadlang::vision::Photo;
+use std::io::ErrorKind;
 use std::sync::Arc;
 
 /// How many modes are shown, as many as the table has.
@@ -19,20 +19,34 @@ const SHOWN: usize = 5;
 const COLUMNS: u32 = 3;
 const SIDE: u32 = 384;
 
-/// Each mode's best state, with what is said below its picture.
-pub fn best_of_each(modes: &[Mode], best: &BestSoFar) -> Vec<(String, Arc<BestState>)> {
+/// A mode's best state.
+pub struct Place {
+    /// Which mode, from 1.
+    number: usize,
+    /// What is said below its picture.
+    said: String,
+    best: Arc<BestState>,
+}
+
+/// The file of a mode's picture.
+pub fn name(mode: usize) -> String {
+    format!("mode-{mode}.png")
+}
+
+/// Each mode's best state.
+pub fn best_of_each(modes: &[Mode], best: &BestSoFar) -> Vec<Place> {
     let chains: usize = modes.iter().map(|m| m.chains.len()).sum();
     let state = |m: &Mode| {
         let all = m.chains.iter().filter_map(|c| best.of_chain(c.checked_sub(1)?));
         all.max_by(|a, b| a.log_joint.total_cmp(&b.log_joint))
     };
-    let said = |(i, m): (usize, &Mode)| {
+    let place = |(i, m): (usize, &Mode)| {
         let best = state(m)?;
         let probability = m.probability.map_or(String::new(), |p| format!(", {:.0}%", 100.0 * p));
-        let text = format!("{}: {} of {chains}{probability}, {:.0}", i + 1, m.chains.len(), best.log_joint);
-        Some((text, best))
+        let said = format!("{}: {} of {chains}{probability}, {:.0}", i + 1, m.chains.len(), best.log_joint);
+        Some(Place { number: i + 1, said, best })
     };
-    modes.iter().take(SHOWN).enumerate().filter_map(said).collect()
+    modes.iter().take(SHOWN).enumerate().filter_map(place).collect()
 }
 
 /// A picture with a longer side of so many pixels.
@@ -42,36 +56,38 @@ pub fn sized(picture: &RgbImage, side: u32) -> RgbImage {
     resize(picture, w, h, FilterType::Triangle)
 }
 
-/// Writes `modes.png` and shows it on the page, if there are several modes and something is seen.
+/// Writes `modes.png`, and `mode-N.png` of each, if there are several modes and something is seen. Those of an earlier part of the run
+/// are removed.
 pub fn show_places(
     dir: &RunDir,
     seed: u64,
     model: &Model,
-    places: &[(String, Arc<BestState>)],
+    places: &[Place],
     photo: Option<&Photo>,
-    shown: &mut Shown,
 ) -> Result<(), Failure> {
+    for old in (1..=SHOWN).map(name).chain(["modes.png".to_owned()]).map(|name| dir.file(&name)) {
+        match std::fs::remove_file(&old) {
+            Err(e) if e.kind() != ErrorKind::NotFound => return Err(plain(format!("{}: {e}", old.display()))),
+            _ => {}
+        }
+    }
     let (mut pictures, mut captions) = (Vec::new(), Vec::new());
-    for (text, best) in places {
+    for place in places {
         let draws = scene::predictive(seed, 3);
-        let mut trace = scene::rebuilt(model, &best.choices, draws)?;
+        let mut trace = scene::rebuilt(model, &place.best.choices, draws)?;
         let Some(view) = scene::view(&mut trace, draws, None) else { return Ok(()) };
         let camera = view.camera();
         let size = photo.map_or((camera.width, camera.height), |p| (p.width(), p.height()));
         let picture = over(&view, photo.map(Photo::rgb), size);
         pictures.push(sized(&picture, SIDE));
-        captions.push(text.clone());
+        captions.push(place.said.clone());
     }
     if pictures.len() < 2 {
         return Ok(());
     }
-    let sheet = captioned_sheet(&pictures, COLUMNS, &captions);
-    let bytes = png(&sheet).map_err(|e| plain(e.to_string()))?;
-    write(dir, "modes.png", &bytes)?;
-    shown.pictures.push((
-        "the modes found by the chains: number of chains, estimated probability, log joint \
-         density of the best state",
-        bytes,
-    ));
-    Ok(())
+    let encoded = |picture: &RgbImage| png(picture).map_err(|e| plain(e.to_string()));
+    for (place, picture) in places.iter().zip(&pictures) {
+        write(dir, &name(place.number), &encoded(picture)?)?;
+    }
+    write(dir, "modes.png", &encoded(&captioned_sheet(&pictures, COLUMNS, &captions))?)
 }

@@ -24,12 +24,14 @@ pub(super) fn all_name(chain: u32) -> String {
 
 /// What a chain's file has.
 #[derive(Default)]
-struct Found {
+pub(super) struct Found {
     comments: String,
-    columns: Vec<Column>,
+    /// The columns of any of its draws.
+    pub(super) columns: Vec<Column>,
     /// Whether one line of names is all there is.
     plain: bool,
-    draws: u64,
+    /// The number of its draws.
+    pub(super) draws: u64,
 }
 
 /// Brings the files of so many chains to the same columns and, if `even`, to equally many draws: as many as the chain with the fewest has,
@@ -62,7 +64,11 @@ pub(super) fn restore(dir: &Path, chain: u32) -> io::Result<()> {
     }
 }
 
-fn look(path: &Path) -> io::Result<Found> {
+/// What a chain's file has.
+///
+/// # Errors
+/// If it cannot be read.
+pub(super) fn look(path: &Path) -> io::Result<Found> {
     let mut found = Found { plain: true, ..Found::default() };
     for line in BufReader::new(File::open(path)?).lines() {
         let line = line?;

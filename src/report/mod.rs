@@ -23,6 +23,7 @@ pub mod npy;
 mod number;
 #[doc(hidden)]
 pub mod pictures;
+mod reread;
 mod rundir;
 mod sinks;
 #[doc(hidden)]
@@ -48,6 +49,8 @@ pub use modes::{DISAGREE, Mode, modes, modes_table, r_hat_text};
 pub use moments::{Moments, Point};
 #[doc(hidden)]
 pub use number::{number, seconds};
+#[doc(hidden)]
+pub use reread::{rename, reread};
 pub use rundir::{RunDir, RunDirError};
 pub use sinks::{Memory, Tee};
 #[doc(hidden)]

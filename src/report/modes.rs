@@ -4,7 +4,7 @@ use super::{Quantity, number, table};
 use crate::infer::diagnostics;
 use crate::infer::{Evidence, Weighed};
 use indexmap::IndexMap;
-use serde::Serialize;
+use serde::{Deserialize, Deserializer, Serialize};
 use std::fmt::Write;
 
 /// Chains whose worst R-hat is above this are looked at for modes.
@@ -15,7 +15,7 @@ const COMPARED: usize = 20;
 const SHOWN: (usize, usize) = (5, 8);
 
 /// Chains that agree with each other and not with the rest.
-#[derive(Clone, Debug, PartialEq, Serialize)]
+#[derive(Clone, Debug, PartialEq, Serialize, Deserialize)]
 pub struct Mode {
     /// Their numbers, from 1.
     pub chains: Vec<usize>,
@@ -28,9 +28,21 @@ pub struct Mode {
     /// The logarithm of its evidence and the standard error of that, if there is an estimate ([`diagnostics::log_evidence()`]).
     pub log_evidence: Option<[f64; 2]>,
     /// The mean log joint density of their draws.
+    #[serde(deserialize_with = "number_or_null")]
     pub log_joint: f64,
     /// The mean and standard deviation of each quantity over their draws.
+    #[serde(deserialize_with = "numbers_or_null")]
     pub quantities: IndexMap<String, [f64; 2]>,
+}
+
+/// JSON has no number for what is not finite.
+fn number_or_null<'de, D: Deserializer<'de>>(from: D) -> Result<f64, D::Error> {
+    Ok(Option::deserialize(from)?.unwrap_or(f64::NAN))
+}
+
+fn numbers_or_null<'de, D: Deserializer<'de>>(from: D) -> Result<IndexMap<String, [f64; 2]>, D::Error> {
+    let read: IndexMap<String, [Option<f64>; 2]> = IndexMap::deserialize(from)?;
+    Ok(read.into_iter().map(|(name, m)| (name, m.map(|x| x.unwrap_or(f64::NAN)))).collect())
 }
 
 /// The modes of a run, the most probable first, or the one of most chains where probabilities are not known; none where the chains

@@ -11,12 +11,16 @@ use std::path::{Path, PathBuf};
 pub const MARK: &str = "run.json";
 /// What it holds while an earlier run is cleared away.
 const CLEARED: &[u8] = b"{}";
-/// What a run writes besides `run.json`, the draws `chain-N.csv`, and what its program exports.
-const WRITTEN: [&str; 15] = [
+/// What a run writes besides `run.json`, files with numbers, and what its program exports.
+const WRITTEN: [&str; 19] = [
+    "program.pcad",
     "traces.jsonl",
     super::zarr::ZARR,
     "summary.json",
     "best.trace.json",
+    "photo.jpg",
+    "photo_contours.png",
+    "joints.png",
     "overlay.png",
     "contours.png",
     "uncertainty.png",
@@ -78,7 +82,7 @@ impl RunDir {
         if names.contains(&MARK) {
             write_whole(path, MARK, CLEARED).map_err(io)?;
         }
-        for name in names.into_iter().filter(|n| is_partial(n) || is_chain(n) || WRITTEN.contains(n)) {
+        for name in names.into_iter().filter(|n| is_partial(n) || is_numbered(n) || WRITTEN.contains(n)) {
             let path = path.join(name);
             if path.is_dir() { std::fs::remove_dir_all(path) } else { std::fs::remove_file(path) }.map_err(io)?;
         }
@@ -139,11 +143,10 @@ fn numbered(parent: &Path, name: &str, n: u32) -> PathBuf {
     parent.join(if n == 1 { name.to_owned() } else { format!("{name}-{n}") })
 }
 
-/// Whether a file holds draws of a chain, or its checkpoint: `chain-N.csv`, `draws-N.csv`, `chain-N.checkpoint`.
-fn is_chain(name: &str) -> bool {
-    let csv = |prefix: &str| name.strip_prefix(prefix)?.strip_suffix(".csv");
-    let checkpoint = || name.strip_prefix("chain-")?.strip_suffix(".checkpoint");
-    let number = csv("chain-").or_else(|| csv("draws-")).or_else(checkpoint);
+/// Whether a file holds draws of a chain, its checkpoint, or the picture of a mode.
+fn is_numbered(name: &str) -> bool {
+    let forms = [("chain-", ".csv"), ("draws-", ".csv"), ("chain-", ".checkpoint"), ("mode-", ".png")];
+    let number = forms.iter().find_map(|(before, after)| name.strip_prefix(before)?.strip_suffix(after));
     number.is_some_and(|n| !n.is_empty() && n.bytes().all(|b| b.is_ascii_digit()))
 }
 
@@ -191,6 +194,8 @@ mod tests {
             "chain-12.csv",
             "draws-2.csv",
             "best.obj",
+            "mode-2.png",
+            "mode-x.png",
             ".report.html.partial",
             "notes.txt",
             "chain-x.csv",
@@ -198,7 +203,7 @@ mod tests {
             std::fs::write(dir.file(name), b"old").unwrap();
         }
         RunDir::create(&base).unwrap();
-        assert_eq!(names(&base), ["chain-x.csv", "notes.txt", MARK]);
+        assert_eq!(names(&base), ["chain-x.csv", "mode-x.png", "notes.txt", MARK]);
         std::fs::remove_dir_all(&base).unwrap();
     }
 

@@ -32,6 +32,19 @@ pub(super) fn escaped(text: &str) -> String {
     out
 }
 
+/// A name of a quantity or a kernel as text that may go on in another line where one of its parts ends, and nowhere else.
+pub(super) fn breakable(name: &str) -> String {
+    let mut out = String::with_capacity(2 * name.len());
+    let mut parts = name.split_inclusive(['.', '_', '/', '[', '(', ',', ';', ':', '-']).peekable();
+    while let Some(part) = parts.next() {
+        out.push_str(&escaped(part));
+        if parts.peek().is_some() {
+            out.push_str("<wbr>");
+        }
+    }
+    out
+}
+
 /// Coordinates in a row, separated by commas, to a ten-thousandth of the largest: the page stays small, and every number
 /// is one in JSON.
 pub(super) fn coordinates(positions: &[[f32; 3]]) -> String {
@@ -66,6 +79,13 @@ mod tests {
         assert_eq!(coordinates(&[[1.234_567e-6, 0.0, -5e-7]]), "0.0000012346,0,-0.0000005");
         assert_eq!(coordinates(&[[3e30, 1e-30, f32::NAN]]).split(',').count(), 3);
         assert_eq!((coordinates(&[]), coordinates(&[[0.0; 3]])), (String::new(), "0,0,0".into()));
+    }
+
+    #[test]
+    fn names_break_between_their_parts() {
+        assert_eq!(breakable("drift(one(@**))"), "drift(<wbr>one(<wbr>@**))");
+        assert_eq!(breakable("a_<b>."), "a_<wbr>&lt;b&gt;.");
+        assert_eq!((breakable("slope"), breakable("")), ("slope".into(), String::new()));
     }
 
     #[test]

@@ -1,14 +1,17 @@
-//! `report.html`: one file that holds everything: pictures, plots, tables, the mesh to turn round, the program.
+//! `report.html`: one file that holds everything: pictures, plots, tables, the mesh to turn round,
+//! the program.
 //!
 //! Invariant: the page asks nothing of the network, and whatever it quotes is escaped.
 
 mod encode;
+mod pictures;
 mod plots;
+mod tables;
 
-use super::{Mode, Quantity, number, r_hat_text, seconds};
+use super::{Mode, Quantity};
 use crate::infer::draws::KernelStats;
 pub use encode::base64;
-use encode::{coordinates, escaped};
+use encode::escaped;
 use std::fmt::Write;
 
 /// What a page shows.
@@ -16,14 +19,20 @@ use std::fmt::Write;
 pub struct Page<'a> {
     /// The program's name.
     pub title: &'a str,
+    /// What is said below it: when it was, how long it took, and the like.
+    pub facts: Vec<String>,
+    /// What is typed to have the run again; nothing if that is not known.
+    pub command: &'a str,
     /// Pairs of setting and value.
     pub settings: Vec<(&'a str, String)>,
-    /// PNG files with their captions.
-    pub pictures: Vec<(&'a str, Vec<u8>)>,
+    /// Pictures; those that belong side by side together.
+    pub pictures: Vec<Vec<Picture<'a>>>,
     /// The scalar quantities.
     pub quantities: &'a [Quantity],
     /// The modes that the chains are in, if there are several.
     pub modes: &'a [Mode],
+    /// A picture of each of the first modes, as files.
+    pub mode_pictures: Vec<Option<Vec<u8>>>,
     /// The kernels.
     pub kernels: &'a [KernelStats],
     /// What a reader should know first.
@@ -34,6 +43,17 @@ pub struct Page<'a> {
     pub mesh: Option<MeshData<'a>>,
     /// The program's text.
     pub program: &'a str,
+}
+
+/// A picture on the page.
+#[derive(Clone, Debug, Default)]
+pub struct Picture<'a> {
+    /// What is said below it.
+    pub caption: &'a str,
+    /// The bytes of a PNG or JPEG file.
+    pub file: Vec<u8>,
+    /// Whether it is bright lines on black: a bright page shows them dark on white.
+    pub lines: bool,
 }
 
 /// A mesh to turn round.
@@ -48,7 +68,7 @@ pub struct MeshData<'a> {
 /// Quantities that get plots.
 const PLOTTED: usize = 40;
 const STYLE: &str = include_str!("style.css");
-const VIEWER: &str = include_str!("viewer.js");
+const COPY: &str = include_str!("copy.js");
 
 /// The page. Writing to a text does not fail, so results of `write!` are not looked at here.
 pub fn page(p: &Page) -> String {
@@ -57,175 +77,70 @@ pub fn page(p: &Page) -> String {
     let _ = write!(
         s,
         "<!doctype html>\n<html lang=\"en\"><meta charset=\"utf-8\">\
-         <meta name=\"viewport\" content=\"width=device-width\"><title>{title}</title>\
+         <meta name=\"viewport\" content=\"width=device-width, initial-scale=1\">\
+         <meta name=\"color-scheme\" content=\"light dark\"><title>{title}</title>\
          <style>\n{STYLE}</style>\n<h1>{title}</h1>\n"
     );
+    if !p.facts.is_empty() {
+        let facts: Vec<String> = p.facts.iter().map(|f| escaped(f)).collect();
+        let _ = writeln!(s, "<p class=\"facts\">{}</p>", facts.join(" · "));
+    }
+    if !p.command.is_empty() {
+        let _ = writeln!(s, "<div class=\"command\"><pre id=\"command\">{}</pre></div>", escaped(p.command));
+        let _ = writeln!(s, "<script>\n{COPY}</script>");
+    }
     for w in p.warnings {
         let _ = writeln!(s, "<p class=\"warning\">{}</p>", escaped(w));
     }
-    pictures(&mut s, p);
-    quantities(&mut s, p.quantities);
-    modes(&mut s, p.modes, p.quantities);
-    kernels(&mut s, p.kernels);
-    draws(&mut s, p.quantities);
-    if !p.approximate.is_empty() {
-        s.push_str("<h2>What is approximate</h2>\n<ul>\n");
-        p.approximate.iter().for_each(|a| {
-            let _ = writeln!(s, "<li>{}", escaped(a));
-        });
-        s.push_str("</ul>\n");
+    let parts = parts(p);
+    s.push_str("<nav>");
+    for (id, heading, _) in &parts {
+        let _ = write!(s, "<a href=\"#{id}\">{heading}</a> ");
     }
-    s.push_str("<h2>Settings</h2>\n<table class=\"settings\">\n");
-    for (k, v) in &p.settings {
-        let _ = writeln!(s, "<tr><td>{}<td>{}</tr>", escaped(k), escaped(v));
+    s.push_str("</nav>\n");
+    for (id, heading, body) in &parts {
+        let _ = write!(s, "<section id=\"{id}\">\n<h2>{heading}</h2>\n{body}</section>\n");
     }
-    let _ = write!(s, "</table>\n<h2>Program</h2>\n<pre>{}</pre></html>", escaped(p.program));
+    s.push_str("</html>");
     s
 }
 
-fn pictures(s: &mut String, p: &Page) {
-    if p.pictures.is_empty() && p.mesh.is_none() {
-        return;
+/// What the page is made of, without what is empty: names to link to, headings, contents.
+fn parts(p: &Page) -> Vec<(&'static str, &'static str, String)> {
+    let mut all = vec![
+        ("pictures", "Pictures", pictures::pictures(p)),
+        ("quantities", "Quantities", tables::quantities(p.quantities)),
+        ("modes", "Modes", tables::modes(p)),
+        ("draws", "Draws", draws(p.quantities)),
+        ("kernels", "Kernels", tables::kernels(p.kernels)),
+        ("approximate", "Approximations", tables::list(p.approximate)),
+        ("settings", "Settings", tables::settings(&p.settings)),
+    ];
+    if !p.program.is_empty() {
+        all.push(("program", "Program", format!("<pre>{}</pre>\n", escaped(p.program))));
     }
-    s.push_str("<div class=\"pictures\">\n");
-    for (caption, png) in &p.pictures {
-        let (caption, data) = (escaped(caption), base64(png));
-        let _ = writeln!(
-            s,
-            "<figure><img alt=\"{caption}\" src=\"data:image/png;base64,{data}\"><figcaption>{caption}</figcaption></figure>"
-        );
-    }
-    if let Some(m) = &p.mesh {
-        let known = |t: &&[u32; 3]| t.iter().all(|i| (*i as usize) < m.positions.len());
-        let triangles: Vec<String> = m.triangles.iter().filter(known).flatten().map(u32::to_string).collect();
-        let _ = writeln!(
-            s,
-            "<figure><canvas id=\"mesh\" width=\"384\" height=\"384\" tabindex=\"0\"></canvas>\
-             <figcaption>the best state; drag to turn it, wheel to come closer, double click to go back</figcaption></figure>\n\
-             <script type=\"application/json\" id=\"mesh-data\">{{\"positions\":[{}],\"triangles\":[{}]}}</script>\n\
-             <script>\n{VIEWER}</script>",
-            coordinates(m.positions),
-            triangles.join(",")
-        );
-    }
-    s.push_str("</div>\n");
+    all.retain(|(.., body)| !body.is_empty());
+    all
 }
 
-fn quantities(s: &mut String, quantities: &[Quantity]) {
-    s.push_str(
-        "<h2>Quantities</h2>\n<table>\n<tr><th>quantity<th>mean<th>sd<th>5%<th>median<th>95%<th>\
-         <abbr title=\"Monte Carlo standard error of the mean\">error</abbr><th>ESS bulk<th>ESS tail<th>R-hat</tr>\n",
-    );
-    for q in quantities {
-        let m = &q.summary;
-        let _ = write!(s, "<tr><td>{}", escaped(&q.name));
-        for x in [m.mean, m.sd, m.q05, m.q50, m.q95, m.mcse_mean, m.ess_bulk.round(), m.ess_tail.round()] {
-            let _ = write!(s, "<td>{}", number(x));
-        }
-        let class = if m.r_hat > 1.01 { " class=\"bad\"" } else { "" };
-        let r_hat = escaped(&r_hat_text(m.r_hat));
-        let _ = writeln!(s, "<td{class}>{r_hat}</tr>");
-    }
-    s.push_str("</table>\n");
-}
-
-/// The modes that the chains are in, if there are several.
-fn modes(s: &mut String, found: &[Mode], quantities: &[Quantity]) {
-    let rows = super::modes::modes_rows(found, quantities);
-    let Some((head, body)) = rows.split_first() else { return };
-    let _ = writeln!(s, "<h2>Modes</h2>\n<p class=\"note\">The chains are in {} different modes.</p>", found.len());
-    s.push_str("<table>\n<tr>");
-    head.iter().for_each(|h| {
-        let _ = write!(s, "<th>{}", escaped(h));
-    });
-    s.push_str("</tr>\n");
-    for row in body {
-        s.push_str("<tr>");
-        row.iter().for_each(|c| {
-            let _ = write!(s, "<td>{}", escaped(c));
-        });
-        s.push_str("</tr>\n");
-    }
-    s.push_str("</table>\n");
-}
-
-fn kernels(s: &mut String, kernels: &[KernelStats]) {
-    if kernels.is_empty() {
-        return;
-    }
-    s.push_str("<h2>Kernels</h2>\n<table>\n<tr><th>kernel<th>proposals<th>accepted<th>failed<th>time</tr>\n");
-    for k in kernels {
-        let rate = k.acceptance().map_or("-".to_owned(), |r| format!("{:.0}%", 100.0 * r));
-        let (name, time) = (escaped(&k.name), seconds(k.seconds));
-        let _ = writeln!(s, "<tr><td>{name}<td>{}<td>{rate}<td>{}<td>{time}</tr>", k.proposals, k.failed);
+fn draws(quantities: &[Quantity]) -> String {
+    let mut s = String::new();
+    if quantities.is_empty() {
+        return s;
     }
     s.push_str(
-        "</table>\n<p class=\"note\">After warm-up. Failed: the program has no value at what was proposed.</p>\n",
+        "<p class=\"note\">One colour per chain. First: trace plot. Second: density. Third: rank plot, flat if the chains agree.</p>\n",
     );
-}
-
-fn draws(s: &mut String, quantities: &[Quantity]) {
-    s.push_str(
-        "<h2>Draws</h2>\n<p class=\"note\">One colour a chain. Left: in order. Middle: their distribution. Right: how often \
-         each rank among all draws is the chain's, level where chains agree.</p>\n",
-    );
-    for q in quantities.iter().take(PLOTTED) {
+    for (i, q) in quantities.iter().take(PLOTTED).enumerate() {
         let (a, b, c) = (plots::traces(q), plots::marginal(q), plots::ranks(q));
-        let _ = writeln!(s, "<div class=\"plots\"><b>{}</b>{a}{b}{c}</div>", escaped(&q.name));
+        let name = encode::breakable(&q.name);
+        let _ = writeln!(s, "<div class=\"plots\" id=\"q{i}\"><b>{name}</b>{a}{b}{c}</div>");
     }
     if let Some(more) = quantities.len().checked_sub(PLOTTED + 1) {
-        let _ = writeln!(s, "<p class=\"note\">… and {} more, in the files of draws.</p>", more + 1);
+        let _ = writeln!(s, "<p class=\"note\">… and {} more, in the draw files.</p>", more + 1);
     }
+    s
 }
 
 #[cfg(test)]
-mod tests {
-    use super::*;
-    use crate::infer::diagnostics::summary;
-
-    #[test]
-    fn the_page_is_whole_and_escapes_what_it_quotes() {
-        let text = "</pre><script>alert(1)</script> & \"s\" 'q'";
-        let chains = vec![vec![1.0, 2.0, 4.0, 3.0, 2.0], vec![9.0, 8.0, 9.5, 9.0, 8.5]];
-        let q = Quantity { name: text.into(), column: Some(0), summary: summary(&chains), chains };
-        let kernel = KernelStats { name: text.into(), ..Default::default() };
-        let page = page(&Page {
-            title: text,
-            program: text,
-            pictures: vec![(text, vec![1, 2, 3])],
-            mesh: Some(MeshData { positions: &[[0.0, f32::NAN, 2.0]; 3], triangles: &[[0, 1, 2], [0, 1, 3]] }),
-            settings: vec![("seed", text.into())],
-            modes: &super::super::modes(std::slice::from_ref(&q), None),
-            quantities: &[q],
-            kernels: &[kernel],
-            warnings: &[text.into()],
-            approximate: &[text.into()],
-        });
-        assert!(!page.contains("alert(1)</") && !page.contains("& ") && !page.contains("alert(1)<"), "escaped");
-        assert_eq!(page.matches("&lt;script&gt;alert(1)&lt;/script&gt; &amp; &quot;s&quot;").count(), 12);
-        assert!(page.contains("data:image/png;base64,AQID"));
-        assert!(page.contains("{\"positions\":[0,0,2,0,0,2,0,0,2],\"triangles\":[0,1,2]}"));
-        assert!(page.contains("<td class=\"bad\">") && page.contains("<td>0<td>-<td>0<td>0.00 s"));
-        assert!(page.ends_with("</html>") && !page.contains("http"), "nothing comes from the network");
-        for tag in ["table", "div", "figure", "script", "svg", "canvas", "pre", "h2"] {
-            let (opened, closed) = (format!("<{tag}"), format!("</{tag}>"));
-            assert_eq!(page.matches(&opened).count(), page.matches(&closed).count(), "{tag}");
-        }
-    }
-
-    #[test]
-    fn a_page_of_nothing() {
-        let page = page(&Page::default());
-        assert!(page.ends_with("</html>") && !page.contains("<canvas") && !page.contains("more, in the files"));
-    }
-
-    #[test]
-    fn many_quantities_are_listed_but_not_all_plotted() {
-        let chains = vec![vec![1.0, 2.0]];
-        let q = |i| Quantity { name: format!("q{i}"), column: None, summary: summary(&chains), chains: chains.clone() };
-        let all: Vec<Quantity> = (0..PLOTTED + 3).map(q).collect();
-        let page = page(&Page { quantities: &all, ..Page::default() });
-        assert_eq!(page.matches("class=\"plots\"").count(), PLOTTED);
-        assert!(page.contains("and 3 more") && page.contains("<td>q42<"));
-    }
-}
+mod tests;

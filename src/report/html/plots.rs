@@ -9,8 +9,8 @@ const WIDTH: f64 = 260.0;
 /// The height of the plot, and with the line of labels below it.
 const HEIGHT: f64 = 90.0;
 const WHOLE: f64 = 103.0;
-/// One colour for each chain, told apart also by the colour blind (Okabe and Ito 2008).
-const COLORS: [&str; 6] = ["#0072b2", "#d55e00", "#009e73", "#cc79a7", "#e69f00", "#56b4e9"];
+/// One colour for each chain, told apart also by the colour blind (Okabe and Ito 2008): classes of the style.
+const COLORS: [&str; 6] = ["c0", "c1", "c2", "c3", "c4", "c5"];
 /// At most this many points of a chain are drawn.
 const POINTS: usize = 400;
 /// Bars of a distribution.
@@ -21,7 +21,7 @@ const RANK_BINS: usize = 20;
 fn open(title: &str) -> String {
     format!(
         "<svg viewBox=\"0 0 {WIDTH} {WHOLE}\" width=\"{WIDTH}\" height=\"{WHOLE}\" role=\"img\"><title>{title}</title>\
-         <rect width=\"{WIDTH}\" height=\"{HEIGHT}\" fill=\"#fafafa\"/>"
+         <rect width=\"{WIDTH}\" height=\"{HEIGHT}\" class=\"field\"/>"
     )
 }
 
@@ -73,7 +73,10 @@ pub(super) fn traces(q: &Quantity) -> String {
                     write!(points, "{:.1},{:.1} ", across * i as f64, HEIGHT - 2.0 - (HEIGHT - 4.0) * place(*x, ends));
             }
             let color = color(c);
-            let _ = write!(s, "<polyline points=\"{points}\" fill=\"none\" stroke=\"{color}\" stroke-width=\"0.8\"/>");
+            let _ = write!(
+                s,
+                "<polyline class=\"{color}\" points=\"{points}\" fill=\"none\" stroke=\"currentColor\" stroke-width=\"0.8\"/>"
+            );
         }
         label(&mut s, false, &format!("{} to {}", number(ends.0), number(ends.1)));
         label(&mut s, true, &format!("{} draws", q.chains.iter().map(Vec::len).max().unwrap_or(0)));
@@ -98,8 +101,8 @@ pub(super) fn marginal(q: &Quantity) -> String {
             let (path, color) = (steps(&bins.map(|b| HEIGHT - (HEIGHT - 4.0) * b / top)), color(c));
             let _ = write!(
                 s,
-                "<path d=\"{path}V{HEIGHT}H0Z\" fill=\"{color}\" fill-opacity=\"0.15\" stroke=\"none\"/>\
-                 <path d=\"{path}\" fill=\"none\" stroke=\"{color}\"/>"
+                "<g class=\"{color}\"><path d=\"{path}V{HEIGHT}H0Z\" fill=\"currentColor\" fill-opacity=\"0.15\"/>\
+                 <path d=\"{path}\" fill=\"none\" stroke=\"currentColor\"/></g>"
             );
         }
         label(&mut s, false, &number(ends.0));
@@ -139,9 +142,10 @@ pub(super) fn ranks(q: &Quantity) -> String {
     // Agreement is at a third of the height; what is beyond the top is cut.
     let height = |share: f64| (HEIGHT - HEIGHT / 3.0 * share).max(2.0);
     let level = height(1.0);
-    let _ = write!(s, "<path d=\"M0,{level:.1}H{WIDTH}\" stroke=\"#bbb\" stroke-dasharray=\"3 3\"/>");
+    let _ = write!(s, "<path d=\"M0,{level:.1}H{WIDTH}\" class=\"level\" stroke-dasharray=\"3 3\"/>");
     for (c, shares) in rank_shares(&q.chains).iter().enumerate().filter(|(c, _)| !q.chains[*c].is_empty()) {
-        let _ = write!(s, "<path d=\"{}\" fill=\"none\" stroke=\"{}\"/>", steps(&shares.map(height)), color(c));
+        let (path, color) = (steps(&shares.map(height)), color(c));
+        let _ = write!(s, "<path class=\"{color}\" d=\"{path}\" fill=\"none\" stroke=\"currentColor\"/>");
     }
     label(&mut s, false, "lowest rank");
     label(&mut s, true, "highest");

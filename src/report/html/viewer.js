@@ -78,7 +78,14 @@
     gl.vertexAttribPointer(slot, 3, gl.FLOAT, false, 24, 12 * i);
   });
   gl.enable(gl.DEPTH_TEST);
-  gl.clearColor(0.98, 0.98, 0.98, 1);
+  // Behind the mesh is what the page has behind its pictures, bright or dark.
+  const dark = matchMedia("(prefers-color-scheme: dark)");
+  function behind() {
+    const [r, g, b] = getComputedStyle(canvas).backgroundColor.match(/[\d.]+/g).map(x => x / 255);
+    gl.clearColor(r, g, b, 1);
+  }
+  behind();
+  dark.addEventListener("change", () => { behind(); draw(); });
 
   const start = { yaw: 0.4, pitch: 0.25, zoom: 0.85 };
   let view = { ...start }, drag = null;

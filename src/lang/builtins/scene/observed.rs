@@ -112,6 +112,13 @@ impl ImageValue {
         found.as_ref().map_err(String::clone)
     }
 
+    /// The contours that programs looked at; none if none has asked.
+    pub fn seen(&self) -> Option<ContourMap> {
+        let otherwise = self.detected.any();
+        let image = otherwise.as_ref().and_then(|v| v.downcast::<ImageValue>()).unwrap_or(self);
+        image.map.get()?.as_ref().ok().cloned()
+    }
+
     /// The photograph with its contours found by a detector wherever a program says nothing of it; contours that were given stay.
     pub fn detecting(image: &Value, by: &DetectorValue) -> Value {
         match image.downcast::<ImageValue>() {

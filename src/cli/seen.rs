@@ -1,0 +1,98 @@
+//! What a run looked at, as files beside the best state: the photograph, its contours, and the
+//! joints that were detected in it.
+
+use super::job::write;
+use super::places::sized;
+use super::{Failure, plain};
+use image::RgbImage;
+use image::codecs::jpeg::JpegEncoder;
+use image::imageops::crop_imm;
+use pcadlang::lang::builtins::scene::ImageValue;
+use pcadlang::lang::value::Located;
+use pcadlang::report::RunDir;
+use pcadlang::report::pictures::{self, DETECTED, LONGER_SIDE, OF_SCENE, Strokes, png};
+use pcadlang::vision::ContourMap;
+
+/// The photograph has no more pixels than this along its longer side.
+const LARGEST: u32 = 1024;
+/// Of a photograph as JPEG.
+const QUALITY: u8 = 90;
+/// What is shown around the joints, as a share of how far they reach.
+const MARGIN: f64 = 0.15;
+
+/// Writes `photo.jpg`, `photo_contours.png` if its contours were looked at, and `joints.png` if any
+/// were detected.
+pub fn show_seen(dir: &RunDir, image: &ImageValue, located: &[Located]) -> Result<(), Failure> {
+    let (width, height) = image.size();
+    let told = |e: image::ImageError| plain(e.to_string());
+    if let Some(photo) = image.as_photo() {
+        let (w, h) = pictures::picture_size(width, height);
+        let mut bytes = Vec::new();
+        let small = sized(photo.rgb(), w.max(h).min(LARGEST));
+        JpegEncoder::new_with_quality(&mut bytes, QUALITY).encode_image(&small).map_err(told)?;
+        write(dir, "photo.jpg", &bytes)?;
+        if let Some(joints) = joints(photo.rgb(), located) {
+            write(dir, "joints.png", &png(&joints).map_err(told)?)?;
+        }
+    }
+    match image.seen() {
+        Some(map) => write(dir, "photo_contours.png", &png(&lines(&map, (width, height))).map_err(told)?),
+        None => Ok(()),
+    }
+}
+
+/// The contours of a photograph, drawn as those of a scene are.
+fn lines(map: &ContourMap, (width, height): (u32, u32)) -> RgbImage {
+    // Points are about a pixel of the map apart.
+    let length = vec![1.0; map.len()];
+    let ContourMap { x, y, tx, ty, .. } = map;
+    pictures::contours(width, height, &Strokes { width: map.width, height: map.height, x, y, tx, ty, length: &length })
+}
+
+/// The part of a photograph that has the joints, with a line from where each was detected to where
+/// the scene has it.
+fn joints(photo: &RgbImage, located: &[Located]) -> Option<RgbImage> {
+    let (w, h) = (f64::from(photo.width()), f64::from(photo.height()));
+    let ends: Vec<[[f64; 2]; 2]> = located.iter().map(|l| [l.own, l.observed].map(|[x, y]| [x * w, y * h])).collect();
+    let along = |k: usize, most: f64| {
+        let all = || ends.iter().flatten().map(|p| p[k]).filter(|x| (0.0..=most).contains(x));
+        let (low, high) = (all().fold(f64::INFINITY, f64::min), all().fold(f64::NEG_INFINITY, f64::max));
+        (low <= high).then_some((low, high))
+    };
+    let ((left, right), (top, bottom)) = (along(0, w)?, along(1, h)?);
+    let margin = MARGIN * (right - left).max(bottom - top).max(1.0);
+    let (x, y) = ((left - margin).max(0.0).floor(), (top - margin).max(0.0).floor());
+    let size = [(right + margin).min(w).ceil() - x, (bottom + margin).min(h).ceil() - y].map(|v| (v as u32).max(1));
+    let part = crop_imm(photo, x as u32, y as u32, size[0], size[1]).to_image();
+    let mut out = sized(&part, LONGER_SIDE);
+    let (size, moved) = ((size[0], size[1]), |p: [f64; 2]| [p[0] - x, p[1] - y]);
+    let ends: Vec<[[f64; 2]; 2]> = ends.iter().map(|e| e.map(moved)).collect();
+    let [own, seen] = [0, 1].map(|k| ends.iter().map(|e| e[k]).collect::<Vec<_>>());
+    pictures::limbs(&mut out, size, &ends, DETECTED);
+    pictures::dots(&mut out, size, &seen, DETECTED);
+    pictures::dots(&mut out, size, &own, OF_SCENE);
+    Some(out)
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    fn located(own: [f64; 2], observed: [f64; 2]) -> Located {
+        Located { name: "a".into(), at: own, variance: 0.0, observed, own, own_variance: 0.0 }
+    }
+
+    #[test]
+    fn joints_are_shown_close_by() {
+        let photo = RgbImage::from_pixel(400, 200, image::Rgb([100; 3]));
+        let all = [located([0.25, 0.5], [0.5, 0.5]), located([0.3, 0.25], [0.3, 0.3]), located([7.0, 0.5], [0.4, 0.4])];
+        let out = joints(&photo, &all).unwrap();
+        // From 100 to 200 across with a margin of 15, from 50 to 100 down.
+        assert_eq!((out.width(), out.height()), (768, 472));
+        let at =
+            |x: f64, y: f64| out.get_pixel(((x - 85.0) * 768.0 / 130.0) as u32, ((y - 35.0) * 768.0 / 130.0) as u32).0;
+        assert_eq!((at(100.0, 100.0), at(200.0, 100.0)), ([255, 220, 0], [90, 220, 255]), "own yellow, detected blue");
+        assert_eq!((at(150.0, 100.0), at(150.0, 90.0)), ([90, 220, 255], [100; 3]), "a line between them");
+        assert!(joints(&photo, &[]).is_none() && joints(&photo, &[located([f64::NAN; 2], [2.0, 2.0])]).is_none());
+    }
+}
