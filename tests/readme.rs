@@ -44,7 +44,7 @@ fn the_commands_run_as_they_are_written() {
     }
     let left = std::fs::read_dir(f.path().join("runs/human")).unwrap();
     let names: Vec<String> = left.map(|e| e.unwrap().file_name().into_string().unwrap()).collect();
-    for ending in [".obj", ".glb", "depth.png", "normals.png", "mask.png"] {
+    for ending in [".obj", ".glb", "depth.npy", "normals.npy", "mask.png"] {
         assert!(names.iter().any(|n| n.ends_with(ending)), "{ending}: {names:?}");
     }
     for run in ["runs/human", "runs/lathe"] {

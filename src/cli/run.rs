@@ -3,6 +3,7 @@
 use super::args::{Job, Run};
 use super::explain::{Explanation, explain};
 use super::job::{self, Interrupt, Manner, Outcome};
+use super::print::paragraph;
 use super::{Failure, earlier, plain, quality};
 use pcadlang::report::{RunDir, modes_table, seconds, table};
 use serde_json::json;
@@ -74,17 +75,18 @@ fn show(a: &Run, job: &Job, dir: &RunDir, o: &Outcome, explained: Option<&Explan
         print_text!("\n{}\n", explained.text());
     }
     for w in &o.warnings {
-        print_line!("warning: {w}");
+        paragraph(&format!("warning: {w}"));
     }
     match &o.approximate[..] {
         [] => {}
-        all if a.verbose => all.iter().for_each(|a| print_line!("approximate: {a}")),
-        [one] => print_line!("approximate: {one}"),
+        all if a.verbose => all.iter().for_each(|a| paragraph(&format!("approximate: {a}"))),
+        [one] => paragraph(&format!("approximate: {one}")),
         all => print_line!("approximate: {} approximations, listed in the report and with --verbose", all.len()),
     }
     if o.chains.first().is_some_and(|c| c.last.is_pseudo()) {
-        print_line!(
-            "note: the image score is not a normalised likelihood: the widths of intervals depend on its scale (a pseudo-posterior)"
+        paragraph(
+            "note: the image score is not a normalised likelihood: the widths of intervals depend on \
+             its scale (a pseudo-posterior)",
         );
     }
     if o.every > 1 {
