@@ -9,6 +9,7 @@ use super::page::{PROGRAM, write_page};
 use super::places::{best_of_each, show_places};
 use super::progress::{self, Ending};
 use super::reopened::{TRACES, arguments};
+use super::seen;
 use super::{Failure, date, edges, files, given, people, plain};
 use pcadlang::bank::BankFiles;
 use pcadlang::infer::draws::{KernelStats, MOST_POINTS, Sink, SiteStats};
@@ -369,6 +370,9 @@ fn fill(
     let approximate = approximate(job, &chains);
     let sites = SiteStats::total(chains.iter().flat_map(|c| &c.sites));
     warnings.extend(chains.first().and_then(|c| structure_warning(&c.last, &sites)));
+    let given = image.as_ref().and_then(|(name, v)| Some((name.as_str(), v.downcast::<ImageValue>()?)));
+    let located = chains.first().map_or_else(Vec::new, |c| c.last.located());
+    warnings.extend(seen::warnings(given, job.keypoints.as_deref(), &located));
     let places = best_of_each(&modes, &best);
     let best = best.state();
     let drawn = show_best(dir, s.seed, model, best.as_deref(), &chains, ready.image())?;

@@ -41,6 +41,24 @@ pub fn show_seen(dir: &RunDir, image: &ImageValue, located: &[Located]) -> Resul
     }
 }
 
+/// That nothing in what was given speaks of the scene: a photograph without contours, keypoints of
+/// which the scene has none.
+pub fn warnings(image: Option<(&str, &ImageValue)>, keypoints: Option<&str>, located: &[Located]) -> Vec<String> {
+    let mut all = Vec::new();
+    if let Some((name, image)) = image
+        && image.seen().is_some_and(|map| map.len() == 0)
+    {
+        all.push(format!(
+            "no contours were found in `{name}`, so it does not constrain the scene: draws come from \
+             the prior (`pcadlang contours` shows what is found)"
+        ));
+    }
+    if let Some(path) = keypoints.filter(|_| located.is_empty()) {
+        all.push(format!("{path} has no keypoint that the scene has, so it does not constrain the pose"));
+    }
+    all
+}
+
 /// The contours of a photograph, drawn as those of a scene are.
 fn lines(map: &ContourMap, (width, height): (u32, u32)) -> RgbImage {
     // Points are about a pixel of the map apart.
@@ -80,6 +98,20 @@ mod tests {
 
     fn located(own: [f64; 2], observed: [f64; 2]) -> Located {
         Located { name: "a".into(), at: own, variance: 0.0, observed, own, own_variance: 0.0 }
+    }
+
+    #[test]
+    fn what_says_nothing_is_named() {
+        let blank = ImageValue::contours(ContourMap::from_image(&image::GrayImage::new(40, 30)), None);
+        let said = warnings(Some(("photo", &blank)), Some("joints.json"), &[]);
+        assert!(said[0].starts_with("no contours were found in `photo`"), "{said:?}");
+        assert!(said[1].starts_with("joints.json has no keypoint"), "{said:?}");
+        let mut disc = image::GrayImage::new(40, 30);
+        (5..25).for_each(|x| disc.put_pixel(x, 9, image::Luma([255])));
+        let seen = ImageValue::contours(ContourMap::from_image(&disc), None);
+        let all = [located([0.25, 0.5], [0.5, 0.5])];
+        assert!(warnings(Some(("photo", &seen)), Some("joints.json"), &all).is_empty());
+        assert!(warnings(None, None, &[]).is_empty());
     }
 
     #[test]
