@@ -143,14 +143,8 @@ impl Model {
                     d = d.note(format!("in the last draw, {}", drawn.join(", ")));
                 }
                 d.hint(match zero.terms.first().is_some_and(|t| t.outside.is_some()) {
-                    true => {
-                        "check the data, or observe them under a distribution whose support \
-                             contains them"
-                    }
-                    false => {
-                        "use a wider prior or a wider likelihood; a factor of -inf excludes \
-                              a state"
-                    }
+                    true => "check the data, or observe them under a distribution whose support contains them",
+                    false => "use a wider prior or a wider likelihood; a factor of -inf excludes a state",
                 })
             }
             ChainError::Sink(e) => plain(format!("cannot write draws: {e}")),
@@ -213,11 +207,7 @@ impl Model {
         sinks: Vec<Box<dyn Sink>>,
     ) -> Result<Vec<Result<ChainResult, ChainError>>, Error> {
         if options.time.is_some() && !clock::RUNS {
-            let d = Diagnostic::new(
-                Severity::Error,
-                "this platform has no clock, so a run cannot \
-                have a time limit",
-            );
+            let d = Diagnostic::new(Severity::Error, "this platform has no clock, so a run cannot have a time limit");
             return Err(Error { diagnostics: vec![d.hint("limit it by `steps`")], sources: self.sources.clone() });
         }
         let (plan, _) = self.plan()?;

@@ -30,10 +30,7 @@ impl Drop for Temporary {
 pub(super) fn features(command: &str, picture: &RgbImage) -> Result<Vec<f32>, BankError> {
     let wrong = |what: String| BankError::Command(format!("`{command}`: {what}"));
     if !command.contains(PICTURE) {
-        return Err(wrong(format!(
-            "the command must contain `{PICTURE}` where the picture's file \
-                                  goes"
-        )));
+        return Err(wrong(format!("the command must contain `{PICTURE}` where the picture's file goes")));
     }
     if cfg!(target_family = "wasm") {
         return Err(wrong("commands cannot be run on this platform".into()));

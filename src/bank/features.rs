@@ -125,12 +125,7 @@ impl Observed {
     /// If what they are of is not observed, or a command fails.
     pub fn query(&self, features: &Features, detector: Option<&str>) -> Result<Query, BankError> {
         let image = self.image.as_ref().and_then(|v| v.downcast::<ImageValue>());
-        let missing = |what: &str| {
-            BankError::Observed(format!(
-                "it is searched by {what}, but the \
-            run observes none"
-            ))
-        };
+        let missing = |what: &str| BankError::Observed(format!("it is searched by {what}, but the run observes none"));
         match features {
             Features::Contours { .. } => {
                 let image = image.ok_or_else(|| missing("the contours of a picture"))?;
@@ -143,8 +138,7 @@ impl Observed {
                     (Some(size), _) => size,
                     (None, true) => (1, 1),
                     (None, false) => {
-                        let what = "the keypoints do not give the size of their picture; add \
-                                    \"width\" and \"height\"";
+                        let what = "the keypoints do not give the size of their picture; add \"width\" and \"height\"";
                         return Err(BankError::Observed(what.into()));
                     }
                 };
@@ -159,8 +153,7 @@ impl Observed {
             Features::Command { command, size } => {
                 if detector != Some(command) {
                     let what = format!(
-                        "its features were computed by a command, which must be given again: \
-                         --features-from '{command}'"
+                        "its features were computed by a command, which must be given again: --features-from '{command}'"
                     );
                     return Err(BankError::Observed(what));
                 }

@@ -41,11 +41,7 @@ pub struct Learn<'a> {
 pub fn learn(model: &Model, how: &Learn, path: &Path, done: &AtomicU64) -> Result<(), BankError> {
     let prior = Trace::prior(Arc::clone(model.code()), model.limits().clone());
     let operand = picture(&mut prior.clone(), draws(how.seed, 0, 0)).ok_or_else(|| {
-        BankError::Observed(
-            "the program has nothing to draw: no top-level name is a view or a \
-                             solid"
-                .into(),
-        )
+        BankError::Observed("the program has nothing to draw: no top-level name is a view or a solid".into())
     })?;
     let (_, first) = one(&prior, operand, how, 0)?;
     let features = how.features.clone().named(&first);

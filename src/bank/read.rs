@@ -130,11 +130,8 @@ impl Bank {
     pub fn nearest(&self, query: &Query, k: usize) -> Result<Vec<(usize, f32)>, BankError> {
         let (width, count) = (self.preamble.width, self.preamble.count);
         if query.len() as u64 != width {
-            let message = format!(
-                "the observed picture has {} features, but those of the bank \
-                                   have {width}",
-                query.len()
-            );
+            let message =
+                format!("the observed picture has {} features, but those of the bank have {width}", query.len());
             return Err(BankError::Command(message));
         }
         let rows = (BLOCK / (4 * width).max(1)).max(1);

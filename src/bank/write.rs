@@ -59,10 +59,8 @@ impl BankWriter {
         for e in entries {
             if e.features.len() as u64 != self.width {
                 let (got, first) = (e.features.len(), self.width);
-                let message = format!(
-                    "a picture has {got} features, but the first had {first}; all must \
-                             have the same number"
-                );
+                let message =
+                    format!("a picture has {got} features, but the first had {first}; all must have the same number");
                 return Err(BankError::Command(message));
             }
             e.features.iter().for_each(|x| features.extend(x.to_le_bytes()));

@@ -105,8 +105,8 @@ fn run<T>(
 fn failure(e: infer::calibration::CalibrationError, model: &Model) -> Failure {
     match e {
         CalibrationError::NotSimulable(reason) => {
-            let hint = "programs are checked on simulated data: they need proper priors, and \
-                        observations that have samplers";
+            let hint =
+                "programs are checked on simulated data: they need proper priors, and observations that have samplers";
             Failure::Plain(reason, Some(hint.into()))
         }
         CalibrationError::TooFew(reason) => plain(reason),
@@ -174,14 +174,7 @@ fn turns(path: &str, said: &Geweke, seed: u64, took: f64) -> String {
 }
 
 fn more(left_out: usize) -> String {
-    if left_out == 0 {
-        String::new()
-    } else {
-        format!(
-            "… and {left_out} more, present in fewer \
-        states\n"
-        )
-    }
+    if left_out == 0 { String::new() } else { format!("… and {left_out} more, present in fewer states\n") }
 }
 
 /// Counts as bars, level with the largest.

@@ -20,10 +20,7 @@ pub fn contours(a: &Contours) -> Result<(), Failure> {
             let size = a.size.unwrap_or(FileDetector::SIZE);
             if size > FileDetector::MOST {
                 let most = FileDetector::MOST;
-                return Err(plain(format!(
-                    "--size {size}: with --edges the longer side may be at \
-                    most {most} pixels"
-                )));
+                return Err(plain(format!("--size {size}: with --edges the longer side may be at most {most} pixels")));
             }
             let map = detector.map(&photo, size).map_err(|e| plain(format!("{spec}: {e}")))?;
             detector.contours(&map, &photo, detector.sigma())

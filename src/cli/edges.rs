@@ -34,12 +34,7 @@ pub fn detector(spec: &str) -> Result<DetectorValue, Failure> {
     let (file, text) = split(spec);
     let options = options(text)?;
     let bytes = files::read(Path::new(file))?;
-    let alone = |other: &str| {
-        Err(format!(
-            "{file} refers to {other}, but a detector must be a \
-        single file"
-        ))
-    };
+    let alone = |other: &str| Err(format!("{file} refers to {other}, but a detector must be a single file"));
     let loaded = data::load("detector", file, &bytes, &options, &alone);
     let loaded = loaded.map_err(|f| Failure::Plain(f.message, f.hint))?;
     let detector = loaded.downcast::<DetectorValue>().cloned().unwrap_or_default();

@@ -176,10 +176,7 @@ impl Explanation {
     /// What was left out, and why.
     fn skipped(&self) -> Vec<String> {
         let absent = |[place, text]: &[String; 2]| {
-            format!(
-                "{place} `{text}`: not sampled, since no observation depends on it in this \
-                     state"
-            )
+            format!("{place} `{text}`: not sampled, since no observation depends on it in this state")
         };
         let mut all: Vec<String> = self.absent.iter().map(absent).collect();
         let most =

@@ -113,10 +113,7 @@ fn part(kind: &str, called: &str, file: &str, id: &str) -> Result<Value, Failure
         serde_json::from_slice(&files::read(Path::new(file))?).map_err(|e| plain(format!("{file}: {e}")))?;
     let found = all.get(id).ok_or_else(|| plain(format!("{file}: no entry {id:?}")))?;
     let alone = |other: &str| {
-        Err(format!(
-            "{called} refers to {other}, but an entry of a JSON \
-        file cannot refer to other files"
-        ))
+        Err(format!("{called} refers to {other}, but an entry of a JSON file cannot refer to other files"))
     };
     data::load(kind, called, found.to_string().as_bytes(), &data::Options::default(), &alone)
         .map_err(|e| Failure::Plain(e.message, e.hint))

@@ -115,11 +115,7 @@ fn compared(what: &str, now: &Replication, draws: &[Vec<Replication>]) -> String
                          predictive p-value); 0.5 is the centre"
     );
     if marked {
-        let _ = writeln!(
-            s,
-            "*: tail probability below {EXTREME} on one side: the program rarely \
-                             produces such data"
-        );
+        let _ = writeln!(s, "*: tail probability below {EXTREME} on one side: the program rarely produces such data");
     }
     s
 }

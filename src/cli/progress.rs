@@ -178,21 +178,13 @@ mod tests {
         let mut k = Known { chains: (4, "chains"), ..Known::default() };
         assert_eq!(line(&k, s(0), None), "starts, 0 s, 0 steps");
         (k.started, k.warming, k.steps, k.best) = (2, 2, 500, Some(-12.34));
-        assert_eq!(
-            line(&k, s(2), Some(s(300))),
-            "warm-up, 4 min 58 s left, best -12.3, 500 \
-            steps, 250 per second"
-        );
+        assert_eq!(line(&k, s(2), Some(s(300))), "warm-up, 4 min 58 s left, best -12.3, 500 steps, 250 per second");
         (k.started, k.warming, k.ended, k.steps) = (4, 0, 2, 12_345_678);
         let said = line(&k, s(2), Some(s(300)));
         assert!(said.starts_with("sampling, 2 of 4 chains, 4 min 58 s left, best -12.3, 12345678 steps"), "{said}");
         // The bar and the line fit a terminal of 80 columns but for the rate.
         assert!(said.find(" steps").is_some_and(|i| i + 6 + 11 <= 80), "{said}");
         (k.ended, k.best) = (4, Some(f64::NEG_INFINITY));
-        assert_eq!(
-            line(&k, s(3), Some(s(3))),
-            "finishing, 4 of 4 chains, 12345678 steps, 4.12e6 \
-            per second"
-        );
+        assert_eq!(line(&k, s(3), Some(s(3))), "finishing, 4 of 4 chains, 12345678 steps, 4.12e6 per second");
     }
 }

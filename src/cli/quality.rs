@@ -36,16 +36,13 @@ pub fn apply(job: &mut Job, keypoints: bool) -> Result<Option<String>, Failure> 
         return Ok(presets.of_time(seconds).map(|choice| fill(job, &choice, &name)));
     };
     let Some((name, presets)) = known else {
-        let hint = "`pcadlang tradeoff` measures settings on cases with ground truth; its option \
-                    --presets writes the file";
+        let hint =
+            "`pcadlang tradeoff` measures settings on cases with ground truth; its option --presets writes the file";
         return Err(Failure::Plain(format!("{program} has no measured presets"), Some(hint.into())));
     };
     if !fits(&presets, keypoints) {
         let needs = presets.needs.join(", ");
-        return Err(plain(format!(
-            "the presets of {program} were measured with {needs}; --quality \
-                                  requires {needs}"
-        )));
+        return Err(plain(format!("the presets of {program} were measured with {needs}; --quality requires {needs}")));
     }
     match presets.of_quality(quality) {
         Some(choice) => Ok(Some(fill(job, &choice, &name))),

@@ -16,8 +16,7 @@ pub fn run(a: &Run) -> Result<(), Failure> {
     let (_, default_plan) = ready.model.plan()?;
     if let (Some(text), false) = (&default_plan, a.quiet) {
         error_line!(
-            "note: the program has no `infer` block; using this default plan, which you \
-                     can copy and edit:\n{text}"
+            "note: the program has no `infer` block; using this default plan, which you can copy and edit:\n{text}"
         );
     }
     let interrupt = Interrupt::listen();
@@ -100,8 +99,7 @@ fn show(a: &Run, job: &Job, dir: &RunDir, o: &Outcome, explained: Option<&Explan
     }
     if o.interrupted {
         print_line!(
-            "interrupted: all draws so far are kept; to resume, repeat the command with --resume \
-             --out {}",
+            "interrupted: all draws so far are kept; to resume, repeat the command with --resume --out {}",
             shown(dir)
         );
     }

@@ -131,10 +131,7 @@ impl SourceMap {
 pub(crate) fn too_large(bytes: usize, span: Span) -> Diagnostic {
     let mib = |b: usize| b as f64 / f64::from(1 << 20);
     let message = format!("the file is too large: {:.1} MiB, at most {} MiB", mib(bytes), mib(MAX_SOURCE_BYTES));
-    Diagnostic::error(message, span, "").hint(
-        "put data into a separate file: `data d = \
-        csv(\"points.csv\");`",
-    )
+    Diagnostic::error(message, span, "").hint("put data into a separate file: `data d = csv(\"points.csv\");`")
 }
 
 #[cfg(test)]

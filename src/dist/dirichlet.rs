@@ -19,13 +19,7 @@ impl Dirichlet {
     /// With these concentrations; fails unless there is one, and all are positive and have a finite sum.
     pub fn new(alpha: &[f64]) -> Result<Dirichlet, ParamError> {
         if alpha.is_empty() {
-            return Err(ParamError::new(
-                "dirichlet",
-                "alpha",
-                "none",
-                "must have one number per \
-                component",
-            ));
+            return Err(ParamError::new("dirichlet", "alpha", "none", "must have one number per component"));
         }
         for a in alpha {
             positive("dirichlet", "alpha", *a)?;

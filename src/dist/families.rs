@@ -94,11 +94,7 @@ pub const FAMILIES: &[Family] = &[
         "The upper half of a Cauchy distribution.",
         &[
             p("location", "The lower end of the support."),
-            p(
-                "scale",
-                "The scale, positive: the \
-            median distance from the location.",
-            ),
+            p("scale", "The scale, positive: the median distance from the location."),
         ],
         "x >= location",
         "2 / (pi scale (1 + ((x - location) / scale)^2))",
@@ -128,8 +124,7 @@ pub const FAMILIES: &[Family] = &[
     ),
     family(
         "truncated",
-        "Any distribution of numbers truncated to an interval; for integers, the bounds are \
-         included.",
+        "Any distribution of numbers truncated to an interval; for integers, the bounds are included.",
         &[
             p("d", "A distribution of numbers, or of arrays of numbers if a parameter is an array."),
             p("lo", "The lower bound."),
@@ -148,28 +143,14 @@ pub const FAMILIES: &[Family] = &[
     family(
         "cauchy",
         "The Cauchy distribution, which has no mean.",
-        &[
-            p("location", "The centre."),
-            p(
-                "scale",
-                "The scale, positive: the median distance from \
-            the location.",
-            ),
-        ],
+        &[p("location", "The centre."), p("scale", "The scale, positive: the median distance from the location.")],
         "all numbers",
         "1 / (pi scale (1 + ((x - location) / scale)^2))",
     ),
     family(
         "laplace",
         "The Laplace (double exponential) distribution.",
-        &[
-            p("location", "The centre."),
-            p(
-                "scale",
-                "The scale, positive: the mean distance from \
-            the location.",
-            ),
-        ],
+        &[p("location", "The centre."), p("scale", "The scale, positive: the mean distance from the location.")],
         "all numbers",
         "exp(-|x - location| / scale) / (2 scale)",
     ),
@@ -180,8 +161,7 @@ pub const FAMILIES: &[Family] = &[
             p("mean", "The mean direction, in radians: any finite number."),
             p(
                 "concentration",
-                "The concentration, not negative; 0 is uniform; if large, 1 / concentration is \
-                 about the variance.",
+                "The concentration, not negative; 0 is uniform; if large, 1 / concentration is about the variance.",
             ),
         ],
         "-pi < x <= pi",
@@ -266,14 +246,7 @@ pub const FAMILIES: &[Family] = &[
     family(
         "multinomial",
         "The multinomial distribution: the counts of each category among n draws.",
-        &[
-            p("n", "The number of draws, an integer."),
-            p(
-                "weights",
-                "One weight per category; they \
-            need not sum to 1.",
-            ),
-        ],
+        &[p("n", "The number of draws, an integer."), p("weights", "One weight per category; they need not sum to 1.")],
         "arrays of len(weights) counts with sum n",
         "n! product((weights[i] / sum(weights))^x[i] / x[i]!)",
     ),
@@ -282,11 +255,7 @@ pub const FAMILIES: &[Family] = &[
         "The LKJ distribution: the Cholesky factor of a correlation matrix, as rows, which `mv_normal` takes as `chol`.",
         &[
             p("n", "The number of rows, from 1 to 1000."),
-            p(
-                "eta",
-                "The shape, positive: 1 is uniform over correlation matrices, larger values \
-                      favour independence.",
-            ),
+            p("eta", "The shape, positive: 1 is uniform over correlation matrices, larger values favour independence."),
         ],
         "lower triangular arrays of n rows L, each of norm 1, with a non-negative diagonal",
         "proportional to det(L L')^(eta - 1) with respect to the correlations: product(L[i][i]^(n \
@@ -309,11 +278,7 @@ pub const FAMILIES: &[Family] = &[
             p("mean", "The mean vector."),
             p("cov", "The covariance matrix, an array of rows; give either `cov` or `chol`."),
             p("chol", "The lower triangular Cholesky factor of the covariance."),
-            p(
-                "whitened",
-                "Non-centred: stores the white noise z of mean + chol z instead of the \
-                           value.",
-            ),
+            p("whitened", "Non-centred: stores the white noise z of mean + chol z instead of the value."),
         ],
         "arrays as long as the mean",
         "exp(-(x - mean)' cov^-1 (x - mean) / 2) / sqrt(det(2 pi cov))",
@@ -326,15 +291,10 @@ pub const FAMILIES: &[Family] = &[
             p("cov", "The covariance function."),
             p("at", "The points."),
             p("centred", "Centred: stores the values instead of the underlying white noise."),
-            p(
-                "jitter",
-                "Added to the diagonal of the covariance matrix, as a fraction of the \
-                         variance.",
-            ),
+            p("jitter", "Added to the diagonal of the covariance matrix, as a fraction of the variance."),
         ],
         "arrays as long as `at`",
-        "mv_normal(mean, K) with K[i][j] = cov(at[i], at[j]), plus jitter times the variance on \
-         the diagonal",
+        "mv_normal(mean, K) with K[i][j] = cov(at[i], at[j]), plus jitter times the variance on the diagonal",
     ),
     family(
         "iid",

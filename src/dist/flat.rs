@@ -26,11 +26,9 @@ impl Flat {
         let bad = |rule| Err(ParamError::new(Self::NAME, "lo to hi", format!("{lo} and {hi}"), rule));
         match () {
             () if lo.is_nan() || hi.is_nan() => bad("must be numbers"),
-            () if lo >= hi || lo == f64::INFINITY || hi == f64::NEG_INFINITY => bad("must have \
-                numbers between them"),
+            () if lo >= hi || lo == f64::INFINITY || hi == f64::NEG_INFINITY => bad("must have numbers between them"),
             () if lo.is_finite() && hi.is_finite() => {
-                bad("must have an infinite end: between two finite bounds use uniform(lo, hi), \
-                     which is proper")
+                bad("must have an infinite end: between two finite bounds use uniform(lo, hi), which is proper")
             }
             () => Ok(Flat { lo, hi }),
         }

@@ -17,15 +17,8 @@ impl MvNormal {
     /// With this mean and covariance; fails unless the mean is finite and the covariance as large, symmetric (to 1e-9 of its
     /// largest entry) and positive definite.
     pub fn from_cov(mean: &[f64], cov: &DMatrix<f64>) -> Result<MvNormal, ParamError> {
-        let size = || {
-            ParamError::new(
-                "mv_normal",
-                "cov",
-                shape(cov),
-                "must be square and match \
-            the length of the mean",
-            )
-        };
+        let size =
+            || ParamError::new("mv_normal", "cov", shape(cov), "must be square and match the length of the mean");
         let packed = lower(cov).filter(|_| cov.nrows() == mean.len()).ok_or_else(size)?;
         if let Some(x) = cov.iter().find(|x| !x.is_finite()) {
             return Err(ParamError::new("mv_normal", "cov", x, "must be finite"));
@@ -48,8 +41,7 @@ impl MvNormal {
                 "mv_normal",
                 "chol",
                 shape(chol),
-                "must be square and \
-                match the length of the mean",
+                "must be square and match the length of the mean",
             ));
         }
         let n = mean.len();

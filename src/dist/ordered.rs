@@ -48,15 +48,7 @@ impl Ordered {
         let around = |a: Support, d: &Dist| union(a, d.support());
         let first = parts.first().map_or(Support::Real, Dist::support);
         let support = parts.iter().try_fold(first, around);
-        let support = support.ok_or_else(|| {
-            ParamError::new(
-                "ordered",
-                "d",
-                "different kinds of \
-            values",
-                rule,
-            )
-        })?;
+        let support = support.ok_or_else(|| ParamError::new("ordered", "d", "different kinds of values", rule))?;
         Ok(Ordered { n: parts.len(), parts: Parts::Unlike(parts.into(), support) })
     }
 

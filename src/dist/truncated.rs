@@ -56,10 +56,7 @@ fn bad(parameter: &'static str, value: String, rule: &'static str) -> ParamError
 fn unknown(d: &Dist) -> ParamError {
     let rule = match d {
         Dist::Flat(_) => "must be proper: for a flat prior, give the bounds to `flat(lo, hi)`",
-        Dist::TruncatedNormal(_) | Dist::Truncated(_) => {
-            "must not be truncated already: give all \
-            bounds in one call"
-        }
+        Dist::TruncatedNormal(_) | Dist::Truncated(_) => "must not be truncated already: give all bounds in one call",
         Dist::VonMises(_) => "must not be a distribution of angles, which have no bounds",
         d if d.is_scalar() => "must have a computable distribution function for these parameters",
         _ => "must be a distribution of single numbers",

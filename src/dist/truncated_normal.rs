@@ -46,13 +46,7 @@ impl TruncatedNormal {
         if d.mass > 0.0 {
             Ok(d)
         } else {
-            Err(ParamError::new(
-                Self::NAME,
-                "lo to hi",
-                bounds(),
-                "must have positive width in \
-                units of sd",
-            ))
+            Err(ParamError::new(Self::NAME, "lo to hi", bounds(), "must have positive width in units of sd"))
         }
     }
 

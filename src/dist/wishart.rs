@@ -30,13 +30,7 @@ impl Wishart {
         let n = scale_chol.nrows();
         if n == 0 || scale_chol.ncols() != n {
             let value = format!("{n} x {}", scale_chol.ncols());
-            return Err(ParamError::new(
-                "wishart",
-                "scale_chol",
-                value,
-                "must be square and not \
-                empty",
-            ));
+            return Err(ParamError::new("wishart", "scale_chol", value, "must be square and not empty"));
         }
         if (0..n).any(|j| (0..j).any(|i| scale_chol[(i, j)] != 0.0)) {
             return Err(ParamError::new("wishart", "scale_chol", "one that is not", "must be lower triangular"));
@@ -45,13 +39,7 @@ impl Wishart {
         let scale = Factor::from_lower(scale_chol).ok_or_else(bad)?;
         let df = positive("wishart", "df", df)?;
         if df <= (n - 1) as f64 {
-            return Err(ParamError::new(
-                "wishart",
-                "df",
-                df,
-                "must be above the number of rows \
-                minus 1",
-            ));
+            return Err(ParamError::new("wishart", "df", df, "must be above the number of rows minus 1"));
         }
         let jacobian = |i: usize| (i + 1) as f64 * libm::log(scale_chol[(i, i)]) + LN_SQRT_2PI * i as f64;
         let log_norm = -(0..n).map(jacobian).sum::<f64>();

@@ -33,12 +33,7 @@ pub fn load_in(bytes: &[u8], frame: &FileFrame) -> Result<Mesh, GeomError> {
     let (plain, names) = plain(text(bytes)?)?;
     let options = tobj::LoadOptions { triangulate: true, ignore_points: true, ignore_lines: true, single_index: false };
     let no_materials = |_: &std::path::Path| Ok((Vec::new(), Default::default()));
-    let unreadable = |e: &dyn std::fmt::Display| {
-        GeomError::invalid(format!(
-            "cannot read the OBJ \
-        file: {e}"
-        ))
-    };
+    let unreadable = |e: &dyn std::fmt::Display| GeomError::invalid(format!("cannot read the OBJ file: {e}"));
     let (models, _) = tobj::load_obj_buf(&mut plain.as_bytes(), &options, no_materials).map_err(|e| unreadable(&e))?;
     let (mut positions, mut triangles, mut parts) = (Vec::new(), Vec::new(), Vec::new());
     for m in models.iter().filter(|m| !m.mesh.indices.is_empty()) {

@@ -212,11 +212,8 @@ impl Entry {
         match &mut self.builtin.foreign {
             Some(Foreign::Function { pull, .. } | Foreign::Incremental { pull, .. }) => *pull = Some(Arc::new(product)),
             _ => {
-                self.wrong = Some(
-                    "only functions take a gradient; distributions and likelihoods \
-                                   define their own"
-                        .into(),
-                )
+                self.wrong =
+                    Some("only functions take a gradient; distributions and likelihoods define their own".into())
             }
         }
         if let Some(f) = &self.builtin.foreign {
@@ -271,10 +268,7 @@ impl Entry {
                 wrong.push(format!("`{name}` has two arguments `{own}`"));
             }
             if a.default.is_none() && before.iter().any(|b| b.default.is_some()) {
-                wrong.push(format!(
-                    "`{name}`: the required argument `{own}` must come before the \
-                                    optional ones"
-                ));
+                wrong.push(format!("`{name}`: the required argument `{own}` must come before the optional ones"));
             }
         }
         wrong

@@ -101,8 +101,7 @@ impl Host {
             } else if own.constant(name).is_some() || taken && !e.replaces {
                 wrong(
                     format!("`{name}` is a built-in of the language"),
-                    "choose another name; \
-                    functions can be `replacing()`",
+                    "choose another name; functions can be `replacing()`",
                 );
             } else if self.entries[..i].iter().any(|o| o.builtin.name == b.name) {
                 wrong(format!("the host registers `{name}` twice"), "");

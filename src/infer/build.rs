@@ -79,14 +79,8 @@ pub(super) fn build(
     }
     if name == "delayed" {
         let inner = build(&first.value, frozen, options, env)?;
-        let at = argument(args, 1, "at").ok_or_else(|| {
-            fail(
-                e.span,
-                "delayed needs an \
-            observation, given as `at`"
-                    .into(),
-            )
-        })?;
+        let at = argument(args, 1, "at")
+            .ok_or_else(|| fail(e.span, "delayed needs an observation, given as `at`".into()))?;
         let observations = selector(at, env)?;
         let signature = format!("delayed({}, {observations:?})", inner.signature);
         let kernel = Delayed::new(inner.kernel, observations, e.span);
@@ -95,14 +89,8 @@ pub(super) fn build(
     if name == "abc" {
         let inner = build(&first.value, frozen, options, env)?;
         let eps = positive(argument(args, 1, "eps"), name, "eps", env)?;
-        let eps = eps.ok_or_else(|| {
-            fail(
-                e.span,
-                "abc needs the tolerance `eps`, the largest \
-            accepted distance"
-                    .into(),
-            )
-        })?;
+        let eps =
+            eps.ok_or_else(|| fail(e.span, "abc needs the tolerance `eps`, the largest accepted distance".into()))?;
         let Some(particles) = argument(args, 2, "particles") else {
             let signature = format!("abc({}, {eps})", inner.signature);
             return Ok(Built { kernel: Box::new(Abc::new(inner.kernel, eps, e.span)), signature });
@@ -222,13 +210,7 @@ fn whole(
     let Some(e) = e else { return Ok(default) };
     match evaluate(e, env)? {
         Value::Num(x) if x >= f64::from(least) && x <= f64::from(most) && x == libm::trunc(x) => Ok(x as u32),
-        v => Err(fail(
-            e.span,
-            format!(
-                "`{name}` must be a whole number from {least} to {most}, \
-                                       got {v}"
-            ),
-        )),
+        v => Err(fail(e.span, format!("`{name}` must be a whole number from {least} to {most}, got {v}"))),
     }
 }
 

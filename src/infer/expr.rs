@@ -85,15 +85,7 @@ pub(crate) fn evaluate(e: &Expr, env: &mut Scope) -> Result<Value, Box<RunError>
                         return Ok(v.clone());
                     }
                     let found = env.trace.find(&at).map(|t| env.trace.value(t));
-                    return found.ok_or_else(|| {
-                        fail(
-                            arg.value.span,
-                            format!(
-                                "this state has no \
-                        choice {at}"
-                            ),
-                        )
-                    });
+                    return found.ok_or_else(|| fail(arg.value.span, format!("this state has no choice {at}")));
                 }
                 "log_joint" | "log_prior" | "log_likelihood" if env.moved.is_some() => return Err(unmapped(e)),
                 "log_joint" => return Ok(Value::Num(env.trace.log_joint())),
@@ -161,12 +153,7 @@ fn apply(b: &Builtin, values: &[&Value], e: &Expr) -> Result<Value, Box<RunError
 }
 
 fn unmapped(e: &Expr) -> Box<RunError> {
-    let mut error = fail(
-        e.span,
-        "a map may use only choices and constants, so that its \
-                                  derivatives are known"
-            .into(),
-    );
+    let mut error = fail(e.span, "a map may use only choices and constants, so that its derivatives are known".into());
     error.hint = Some("write it in terms of value(@x) of the choices it depends on".into());
     error
 }

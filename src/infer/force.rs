@@ -52,13 +52,7 @@ pub(crate) fn put(forces: &[Force], trace: &mut Trace, draws: Draws) -> Result<(
         trace.propose(&[(target, Change::Set(datum))], draws)?;
         trace.commit();
         if trace.log_prior() == f64::NEG_INFINITY {
-            return Err(fail(
-                f.span,
-                format!(
-                    "{address} cannot be {value}: its prior density is \
-                zero there"
-                ),
-            ));
+            return Err(fail(f.span, format!("{address} cannot be {value}: its prior density is zero there")));
         }
     }
     Ok(())

@@ -147,11 +147,7 @@ pub(crate) fn address(e: &Expr, env: &mut Scope) -> Result<Address, Box<RunError
 
 fn not_a_selection(span: Span) -> Box<RunError> {
     let mut e = fail(span, "expected a selection of choices".into());
-    e.hint = Some(
-        "an address such as @**, a tag such as $affine, or a combination of these with \
-                   +, - or &"
-            .into(),
-    );
+    e.hint = Some("an address such as @**, a tag such as $affine, or a combination of these with +, - or &".into());
     e
 }
 

@@ -37,8 +37,7 @@ impl Outside {
     pub fn hint(e: &io::Error) -> Option<String> {
         let refused = e.get_ref()?.downcast_ref::<Outside>()?;
         Some(format!(
-            "a program may read only files in its own folder and below; --allow-read {} allows \
-             this folder too",
+            "a program may read only files in its own folder and below; --allow-read {} allows this folder too",
             refused.folder.display()
         ))
     }

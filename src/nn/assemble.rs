@@ -85,22 +85,10 @@ impl File<'_> {
     pub fn operator(&mut self, e: &Entry) -> Fit<(Operator, Vec<usize>)> {
         let first = *e.inputs.first().ok_or("it has no input")?;
         let (input, output) = (self.shapes[first].clone(), self.shapes[e.output].clone());
-        let pictures = || {
-            Size::of(&input).zip(Size::of(&output)).ok_or(
-                "its tensors are not \
-            single images",
-            )
-        };
+        let pictures = || Size::of(&input).zip(Size::of(&output)).ok_or("its tensors are not single images");
         let one = |operator: Operator| Ok((operator, vec![first]));
         let fits = |holds: bool| {
-            if holds {
-                Ok(())
-            } else {
-                Err(Unfit::from(
-                    "the shapes of its \
-            tensors do not match",
-                ))
-            }
+            if holds { Ok(()) } else { Err(Unfit::from("the shapes of its tensors do not match")) }
         };
         match e.code {
             code::CONVOLUTION | code::DEPTHWISE => {
@@ -184,10 +172,8 @@ impl File<'_> {
             code::CONCATENATION => {
                 let axis = e.number(0, 0)?;
                 let axis = if axis < 0 { axis + output.len() as i32 } else { axis };
-                let along = usize::try_from(axis).ok().filter(|a| *a < output.len()).ok_or(
-                    "its dimension \
-                        does not exist",
-                )?;
+                let along =
+                    usize::try_from(axis).ok().filter(|a| *a < output.len()).ok_or("its dimension does not exist")?;
                 let mut whole = 0;
                 for t in &e.inputs {
                     let shape = &self.shapes[*t];
@@ -240,9 +226,7 @@ impl File<'_> {
         if biases.len() == channels {
             Ok(biases)
         } else {
-            Err("the number of biases does not \
-            match its channels"
-                .into())
+            Err("the number of biases does not match its channels".into())
         }
     }
 }

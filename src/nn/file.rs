@@ -38,10 +38,7 @@ pub(super) fn read(bytes: &[u8]) -> Result<Network> {
     let buffers = model.tables(field::BUFFERS)?;
     let mut file = File { tensors, buffers, shapes, same: HashMap::new(), left: MOST_NUMBERS };
     let [input] = graph.indices(field::graph::INPUTS)?[..] else {
-        return Err(format(
-            "expected \
-        exactly one input",
-        ));
+        return Err(format("expected exactly one input"));
     };
     file.check(input)?;
 
@@ -120,10 +117,7 @@ impl File<'_> {
         let inputs: Vec<usize> = inputs.filter_map(|i| usize::try_from(i).ok()).collect();
         let outputs = table.indices(field::operator::OUTPUTS)?;
         let [output] = outputs[..] else {
-            return Err(format(
-                "an operator does not have exactly \
-            one output",
-            ));
+            return Err(format("an operator does not have exactly one output"));
         };
         inputs.iter().chain([&output]).try_for_each(|t| self.check(*t))?;
         let custom = kind.bytes(field::code::CUSTOM)?;

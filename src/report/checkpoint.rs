@@ -23,10 +23,7 @@ pub enum CheckpointError {
     #[error("the checkpoint is damaged")]
     Damaged,
     /// It was written by another version.
-    #[error(
-        "the checkpoint was written by pcadlang {0}; chains may differ under this version, \
-             {VERSION}"
-    )]
+    #[error("the checkpoint was written by pcadlang {0}; chains may differ under this version, {VERSION}")]
     Version(String),
     /// It belongs to another program, data or settings.
     #[error("the checkpoint belongs to another run: the program, its data or its settings differ")]
@@ -104,10 +101,7 @@ mod tests {
         let other = SavedChain { version: "0.0.1".into(), ..saved }.to_bytes();
         assert_eq!(
             error(&other, "a").to_string(),
-            format!(
-                "the checkpoint was written by pcadlang 0.0.1; chains may differ under this \
-                     version, {VERSION}"
-            )
+            format!("the checkpoint was written by pcadlang 0.0.1; chains may differ under this version, {VERSION}")
         );
     }
 }

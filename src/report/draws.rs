@@ -43,10 +43,7 @@ impl Quantity {
             () if self.chains.iter().any(|c| c.len() < 4) => "fewer than 4 draws per chain",
             () if draws().any(|x| x.is_nan()) => "it is missing from some draws",
             () if !draws().all(|x| x.is_finite()) => "it is infinite in some draws",
-            () if self.is_stuck() => {
-                "it never moved in any chain, and the chains have different \
-                                      values"
-            }
+            () if self.is_stuck() => "it never moved in any chain, and the chains have different values",
             () => "it never moved",
         })
     }

@@ -147,14 +147,10 @@ pub(super) fn warning(modes: &[Mode]) -> Option<String> {
         false => format!("the {chains} chains are in {n} different modes"),
     };
     let probable = match (modes[0].probability.map(number), modes[0].by_evidence) {
-        (Some(p), true) => format!(
-            "the first has estimated probability {p}, from the evidence of \
-                                    the modes"
-        ),
-        (Some(p), false) => format!(
-            "the first has probability {p} judged by log density alone, \
-                                     that is, if all modes are equally wide"
-        ),
+        (Some(p), true) => format!("the first has estimated probability {p}, from the evidence of the modes"),
+        (Some(p), false) => {
+            format!("the first has probability {p} judged by log density alone, that is, if all modes are equally wide")
+        }
         (None, _) => "the fraction of chains in a mode does not estimate its probability".into(),
     };
     Some(format!(

@@ -26,8 +26,7 @@ pub fn warnings(quantities: &[Quantity], modes: &[Mode], kernels: &[KernelStats]
         let what = if r > DISAGREE { "the chains disagree" } else { "the chains may not have mixed" };
         let r = if r > 100.0 { "above 100".to_owned() } else { format!("{r:.2}") };
         out.push(format!(
-            "{what}: R-hat of {name} is {r} (it should be at most 1.01); run longer \
-                          with --time or --steps"
+            "{what}: R-hat of {name} is {r} (it should be at most 1.01); run longer with --time or --steps"
         ));
     }
     out.extend(modes::warning(modes));

@@ -159,10 +159,8 @@ impl IntoDiagnostic for SyntaxError {
             Unexpected { found, expected, advice, .. } => unexpected(&found, &expected, advice, span),
             ValueWithoutElse => error("this value is lost when the condition is false", "the `if` has no `else`")
                 .hint("add `else { … }`, or end the expression with `;`"),
-            DrawTarget => error("expected a name before `~`", "this is not a name").hint(
-                "write `x ~ d;` or, with a key, `x[k] ~ d;`; to observe a known value: \
-                       `observe d = v;`",
-            ),
+            DrawTarget => error("expected a name before `~`", "this is not a name")
+                .hint("write `x ~ d;` or, with a key, `x[k] ~ d;`; to observe a known value: `observe d = v;`"),
             TooManyErrors => error("too many errors", "further errors are not shown"),
         }
     }
@@ -179,10 +177,9 @@ fn unknown_character(c: char, span: Span) -> Diagnostic {
         '\u{a0}' | '\u{202f}' | '\u{3000}' | '\u{2000}'..='\u{200a}' => {
             Some("this character looks like a space but is not; replace it with a space")
         }
-        '\u{200b}'..='\u{200f}' | '\u{2028}'..='\u{202e}' | '\u{feff}' => Some(
-            "it is an \
-            invisible character; delete it",
-        ),
+        '\u{200b}'..='\u{200f}' | '\u{2028}'..='\u{202e}' | '\u{feff}' => {
+            Some("it is an invisible character; delete it")
+        }
         '−' | '–' | '—' => Some("write minus as `-`"),
         '×' | '·' | '∗' => Some("write times as `*`"),
         '÷' => Some("write division as `/`"),
@@ -202,10 +199,7 @@ fn unknown_character(c: char, span: Span) -> Diagnostic {
         '，' => Some("a comma is written `,`"),
         '（' | '）' => Some("parentheses are written `(` and `)`"),
         '?' => Some("a choice between two values is written `if c { a } else { b }`"),
-        '\\' => Some(
-            "a function is written `fn(x) { … }`; a statement may continue on the next \
-                      line",
-        ),
+        '\\' => Some("a function is written `fn(x) { … }`; a statement may continue on the next line"),
         _ => None,
     };
     let diagnostic = Diagnostic::error(format!("unknown character {shown}"), span, "");
@@ -221,10 +215,9 @@ fn foreign_spelling(foreign: Foreign, found: &str, span: Span) -> Diagnostic {
         Foreign::LeftArrow => error("").hint(
             "`x ~ d;` makes a random choice, `let x = e;` binds a value; less than minus three is written `x < -3`",
         ),
-        Foreign::RightArrow => error("").hint(
-            "functions have no result type: `fn f(x) { … }`; an arm of `mix` is \
-                            written with `=>`",
-        ),
+        Foreign::RightArrow => {
+            error("").hint("functions have no result type: `fn f(x) { … }`; an arm of `mix` is written with `=>`")
+        }
         Foreign::ColonEq => error("").hint("a value is bound by `let x = e;`, a random choice by `x ~ d;`"),
         Foreign::EqEqEq => error("write `==`"),
         Foreign::NotEqEq => error("write `!=`"),
@@ -236,10 +229,7 @@ fn foreign_spelling(foreign: Foreign, found: &str, span: Span) -> Diagnostic {
             "values cannot be changed; bind a new name, `let y = x + 1;`, or add to the log \
              density, `factor(logw);`",
         ),
-        Foreign::Increment => error("").hint(
-            "values cannot be changed; bind a new name: `let y = \
-            x + 1;`",
-        ),
+        Foreign::Increment => error("").hint("values cannot be changed; bind a new name: `let y = x + 1;`"),
         Foreign::ColonColon => error("write `.`").hint("a name of an included file is written `scene.render`"),
         Foreign::Quote => Diagnostic::error(format!("strings are not written with {found}"), span, "")
             .hint("use straight double quotes: \"like this\""),

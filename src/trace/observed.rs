@@ -284,13 +284,7 @@ fn outside(dist: &Dist, observed: &Value) -> Option<String> {
     let x = observed.to_datum()?;
     let support = dist.support();
     let is_truth = support == Support::Boolean && matches!(x, Datum::Num(0.0 | 1.0));
-    let apart = || {
-        format!(
-            "the observed value {observed} is outside the support of `{}` \
-                            ({support})",
-            dist.name()
-        )
-    };
+    let apart = || format!("the observed value {observed} is outside the support of `{}` ({support})", dist.name());
     (!is_truth && !support.contains(&x)).then(apart)
 }
 

@@ -86,9 +86,7 @@ pub fn decode(bytes: &[u8], scale: f64, limits: &Limits) -> Result<DepthMap, Vis
         image::DynamicImage::ImageLuma8(p) => p.pixels().map(|p| depth(f64::from(p.0[0]))).collect(),
         _ => {
             return Err(VisionError::Damaged(
-                "a depth map must be a greyscale picture with 16 or 8 bits, but this one has \
-                 colours"
-                    .into(),
+                "a depth map must be a greyscale picture with 16 or 8 bits, but this one has colours".into(),
             ));
         }
     };

@@ -140,10 +140,7 @@ pub enum ComparatorError {
     #[error("the observed contours are invalid: their lists differ in length")]
     Map,
     /// A quantised picture whose labels do not fit it.
-    #[error(
-        "a colour-reduced picture needs one label per pixel, each below the number of \
-             colours, 1 to 256"
-    )]
+    #[error("a colour-reduced picture needs one label per pixel, each below the number of colours, 1 to 256")]
     Labels,
 }
 

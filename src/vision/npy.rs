@@ -83,10 +83,8 @@ pub fn parse(bytes: &[u8]) -> Result<NpyArray, VisionError> {
     let end = start + length;
     let header =
         std::str::from_utf8(bytes.get(start..end).ok_or_else(cut)?).map_err(|_| bad("its header is not text"))?;
-    let descr = quoted(field(header, "descr")?).ok_or_else(|| {
-        bad("its elements are records; only plain \
-            numbers are supported")
-    })?;
+    let descr = quoted(field(header, "descr")?)
+        .ok_or_else(|| bad("its elements are records; only plain numbers are supported"))?;
     if !field(header, "fortran_order")?.starts_with("False") {
         return Err(bad("it is in Fortran order; save numpy.ascontiguousarray(a)"));
     }
@@ -107,8 +105,7 @@ pub fn parse(bytes: &[u8]) -> Result<NpyArray, VisionError> {
         "|b1" | "<b1" | "?" => NpyData::Bool(take(1)?.iter().map(|&b| b != 0).collect()),
         other => {
             return Err(bad(format!(
-                "its elements are '{other}'; float32, float64, uint8 and bool (little-endian) are \
-                 supported"
+                "its elements are '{other}'; float32, float64, uint8 and bool (little-endian) are supported"
             )));
         }
     };

@@ -213,11 +213,7 @@ fn cause(error: ImageError) -> VisionError {
     match error {
         ImageError::IoError(e) if e.kind() == std::io::ErrorKind::UnexpectedEof => VisionError::Truncated,
         ImageError::IoError(e) => VisionError::Io(e),
-        ImageError::Limits(_) => VisionError::Damaged(
-            "it needs more memory than any picture of \
-            permitted size"
-                .into(),
-        ),
+        ImageError::Limits(_) => VisionError::Damaged("it needs more memory than any picture of permitted size".into()),
         other => {
             let text = other.to_string();
             let lower = text.to_ascii_lowercase();

@@ -110,8 +110,7 @@ fn people(path: &Path) -> Result<Dataset, Failure> {
         // The picture lies in the dataset.
         if image.is_empty() || Path::new(&image).components().any(|c| !matches!(c, Component::Normal(_))) {
             return Err(plain(format!(
-                "{}: the image of {id}, {image:?}, is not a file in the same \
-                                      folder",
+                "{}: the image of {id}, {image:?}, is not a file in the same folder",
                 file.display()
             )));
         }

@@ -66,8 +66,7 @@ pub fn open(a: &Tradeoff, program: &Program) -> Result<Vec<Case>, Failure> {
         true => Err(Failure::Plain(
             format!("{}: no case has ground truth", a.cases.display()),
             Some(
-                "ground truth is CASE/depth.npy or CASE/gt.npz, keypoints in annotations.json, or \
-                 CASE/reference.json"
+                "ground truth is CASE/depth.npy or CASE/gt.npz, keypoints in annotations.json, or CASE/reference.json"
                     .into(),
             ),
         )),

@@ -45,8 +45,7 @@ impl Folder {
             Some(_) if fresh => whole(&journal, &[])?,
             Some(other) => {
                 if let Some((key, _)) = head.iter().find(|(k, v)| !agrees(k, v, &other[k.as_str()])) {
-                    let hint = "choose another folder with --out, or measure everything again \
-                                with --fresh";
+                    let hint = "choose another folder with --out, or measure everything again with --fresh";
                     let message = format!("{}: {key} has changed", path.display());
                     return Err(Failure::Plain(message, Some(hint.into())));
                 }

@@ -23,10 +23,7 @@ impl Truth {
     /// What the error of an answer is, for tables and plots.
     pub fn error_name(&self) -> &'static str {
         match self {
-            Truth::Surface(_) => {
-                "depth error over the union of estimated and true mask (Z-MAE-U, \
-                                  object heights)"
-            }
+            Truth::Surface(_) => "depth error over the union of estimated and true mask (Z-MAE-U, object heights)",
             Truth::Joints(_) => "fraction of joints not within 0.2 torso lengths (1 - PCKt@0.2)",
             Truth::Posterior(_) => "distance from the reference posterior (its standard deviations)",
         }

@@ -177,11 +177,7 @@ fn what_is_no_factor_is_impossible() {
         assert_eq!(w.log_density(&rows(bad)), f64::NEG_INFINITY, "{bad:?}");
     }
     let message = |df: f64, s: &[f64]| Wishart::new(df, &square(2, s)).unwrap_err().to_string();
-    assert_eq!(
-        message(1.0, &[1.0, 0.0, 0.0, 1.0]),
-        "wishart: df must be above the number of rows \
-        minus 1, got 1"
-    );
+    assert_eq!(message(1.0, &[1.0, 0.0, 0.0, 1.0]), "wishart: df must be above the number of rows minus 1, got 1");
     assert!(message(3.0, &[1.0, 0.5, 0.0, 1.0]).contains("lower triangular"));
     assert!(message(3.0, &[1.0, 0.0, 0.0, 0.0]).contains("positive diagonal"));
     assert!(Wishart::new(3.0, &DMatrix::zeros(0, 0)).is_err());

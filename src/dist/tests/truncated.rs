@@ -228,10 +228,7 @@ fn bounds_without_sense_are_errors() {
     assert_eq!(message(&gamma, 2.0, 1.0), "truncated: lo must be below hi, got 2 and 1");
     assert!(message(&gamma, 1.0, 1.0).contains("an interval without width has no density"));
     assert!(message(&gamma, f64::NAN, 1.0).contains("must be numbers"));
-    assert!(message(&gamma, -2.0, -1.0).contains(
-        "must overlap the support of `d`, got -2 and -1 \
-        of gamma"
-    ));
+    assert!(message(&gamma, -2.0, -1.0).contains("must overlap the support of `d`, got -2 and -1 of gamma"));
     assert!(message(&make("poisson", &[2.0]), 1.2, 1.8).contains("must overlap"));
     assert!(message(&make("geometric", &[1.0]), 1.0, INF).contains("must contain some of the probability"));
     assert!(message(&make("flat", &[]), 0.0, INF).contains("give the bounds to `flat(lo, hi)`"));

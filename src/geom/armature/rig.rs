@@ -80,11 +80,7 @@ impl Rig {
             parents.push(match &j.parent {
                 None => None,
                 Some(p) => Some(*index.get(p.as_str()).ok_or_else(|| {
-                    GeomError::invalid(format!(
-                        "joint `{}` has the parent `{p}`, which is not in \
-                        the rig",
-                        j.name
-                    ))
+                    GeomError::invalid(format!("joint `{}` has the parent `{p}`, which is not in the rig", j.name))
                 })?),
             });
         }
@@ -128,10 +124,7 @@ impl Rig {
                 return Err(GeomError::invalid(format!("two keypoints of the rig are called `{name}`")));
             }
             if !rest.is_finite() {
-                return Err(GeomError::invalid(format!(
-                    "the position of keypoint `{name}` is not \
-                    finite"
-                )));
+                return Err(GeomError::invalid(format!("the position of keypoint `{name}` is not finite")));
             }
             self.keypoints.push(Keypoint { name: name.into(), joint: j, rest });
         }
@@ -210,11 +203,7 @@ mod tests {
         let e = |joints| Rig::new(joints).unwrap_err().to_string();
         assert_eq!(e(vec![]), "a rig has 1 to 4096 joints, not 0");
         assert_eq!(e(vec![joint("a", None), joint("a", None)]), "two joints of the rig are called `a`");
-        assert_eq!(
-            e(vec![joint("a", Some("x"))]),
-            "joint `a` has the parent `x`, which is not in \
-            the rig"
-        );
+        assert_eq!(e(vec![joint("a", Some("x"))]), "joint `a` has the parent `x`, which is not in the rig");
         let round = vec![joint("r", None), joint("a", Some("c")), joint("b", Some("a")), joint("c", Some("b"))];
         assert_eq!(e(round), "the rig has a cycle: c -> b -> a -> c");
         assert_eq!(e(vec![joint("a", Some("a"))]), "the rig has a cycle: a -> a");

@@ -61,12 +61,7 @@ struct JsonMorph {
 }
 
 fn read<'a, T: Deserialize<'a>>(bytes: &'a [u8], what: &str) -> Result<T, GeomError> {
-    serde_json::from_slice(bytes).map_err(|e| {
-        GeomError::invalid(format!(
-            "cannot read the {what} \
-        file: {e}"
-        ))
-    })
+    serde_json::from_slice(bytes).map_err(|e| GeomError::invalid(format!("cannot read the {what} file: {e}")))
 }
 
 /// Reads a rig file.
@@ -88,16 +83,12 @@ pub fn rig_from_json(bytes: &[u8]) -> Result<RigFile, GeomError> {
     let influence = |(v, weights): (usize, &Vec<(usize, f32)>)| {
         let mut i = Influence::default();
         if weights.is_empty() {
-            return Err(GeomError::invalid(format!(
-                "vertex {v} has no skin weight, so no joint \
-                would move it"
-            )));
+            return Err(GeomError::invalid(format!("vertex {v} has no skin weight, so no joint would move it")));
         }
         if weights.len() > MOST_WEIGHTS {
             let n = weights.len();
             return Err(GeomError::invalid(format!(
-                "vertex {v} has {n} skin weights; at most \
-                {MOST_WEIGHTS} are supported"
+                "vertex {v} has {n} skin weights; at most {MOST_WEIGHTS} are supported"
             )));
         }
         // The heaviest first, so that those without weight come last.

@@ -68,13 +68,7 @@ impl<'a> Data<'a> {
         };
         let view = a.buffer_view.ok_or_else(|| wrong("has no bytes (no bufferView)".into()))?;
         let view = self.document.buffer_views.get(view).ok_or_else(|| wrong(format!("uses a missing view {view}")))?;
-        let buffer = self.buffers.get(view.buffer).ok_or_else(|| {
-            wrong(
-                "uses a buffer that does \
-            not exist"
-                    .into(),
-            )
-        })?;
+        let buffer = self.buffers.get(view.buffer).ok_or_else(|| wrong("uses a buffer that does not exist".into()))?;
         let stride = view.byte_stride.filter(|s| *s > 0).unwrap_or(width * size);
         let bytes = || {
             let view = buffer.get(view.byte_offset..view.byte_offset.checked_add(view.byte_length)?)?;

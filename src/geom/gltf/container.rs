@@ -47,13 +47,9 @@ pub(super) fn open(bytes: &[u8]) -> Result<(Document, Option<&[u8]>), GeomError>
     match document.extensions_required.iter().find(|x| !HARMLESS.iter().any(|h| x.starts_with(h))) {
         None => Ok((document, bin)),
         Some(x) if x.contains("compression") => Err(invalid(format!(
-            "the glTF file is compressed ({x}), which is not supported; \
-                                 export without compression"
+            "the glTF file is compressed ({x}), which is not supported; export without compression"
         ))),
-        Some(x) => Err(invalid(format!(
-            "the glTF file requires the extension {x}, which is not \
-                                        supported"
-        ))),
+        Some(x) => Err(invalid(format!("the glTF file requires the extension {x}, which is not supported"))),
     }
 }
 
@@ -87,10 +83,7 @@ pub(super) fn buffers<'a>(
 ) -> Result<Vec<Cow<'a, [u8]>>, GeomError> {
     let count = document.buffers.len();
     if count > MOST_BUFFERS {
-        return Err(invalid(format!(
-            "the glTF file has {count} buffers; at most {MOST_BUFFERS} are \
-                                    supported"
-        )));
+        return Err(invalid(format!("the glTF file has {count} buffers; at most {MOST_BUFFERS} are supported")));
     }
     let mut all = Vec::with_capacity(count);
     for (i, b) in document.buffers.iter().enumerate() {
@@ -102,20 +95,14 @@ pub(super) fn buffers<'a>(
                     data(rest).ok_or_else(|| invalid(format!("buffer {i} of the glTF file is not base64")))?
                 }
                 None if uri.contains("://") => {
-                    return Err(invalid(format!(
-                        "buffer {i} of the glTF file is at {uri}: only \
-                        files are supported"
-                    )));
+                    return Err(invalid(format!("buffer {i} of the glTF file is at {uri}: only files are supported")));
                 }
                 None => read(&unescaped(uri)).map_err(invalid)?,
             }),
         };
         if bytes.len() < b.byte_length {
             let (has, says) = (bytes.len(), b.byte_length);
-            return Err(invalid(format!(
-                "buffer {i} of the glTF file has {has} bytes, but declares \
-                                        {says}"
-            )));
+            return Err(invalid(format!("buffer {i} of the glTF file has {has} bytes, but declares {says}")));
         }
         all.push(bytes);
     }

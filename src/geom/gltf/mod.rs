@@ -70,8 +70,7 @@ impl Loaded {
     pub fn armature(self) -> Result<Armature, GeomError> {
         let Some(rig) = self.rig else {
             return Err(GeomError::invalid(
-                "the glTF file has no skin, so it does not define which \
-                joint moves which vertices",
+                "the glTF file has no skin, so it does not define which joint moves which vertices",
             ));
         };
         let mut known: FxHashMap<Same, u32> = FxHashMap::default();

@@ -49,12 +49,7 @@ impl Nodes {
         match document.scenes.get(document.scene.unwrap_or(0)) {
             Some(scene) => {
                 for i in &scene.nodes {
-                    let missing = || {
-                        GeomError::invalid(format!(
-                            "the scene refers to the missing \
-                        node {i}"
-                        ))
-                    };
+                    let missing = || GeomError::invalid(format!("the scene refers to the missing node {i}"));
                     *drawn.get_mut(*i).ok_or_else(missing)? = true;
                 }
             }

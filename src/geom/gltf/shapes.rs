@@ -80,10 +80,7 @@ fn add(
         0..=3 => return Ok(None),
         4..=6 => {}
         _ => {
-            return Err(GeomError::invalid(format!(
-                "{what} has mode {mode}, which glTF does not \
-            define"
-            )));
+            return Err(GeomError::invalid(format!("{what} has mode {mode}, which glTF does not define")));
         }
     }
     let Some(positions) = p.attributes.get("POSITION") else { return Ok(None) };

@@ -57,10 +57,7 @@ impl Skeleton {
             let missing = || GeomError::invalid(format!("the glTF file has no skin {s}"));
             let skin = data.document.skins.get(s).ok_or_else(missing)?;
             if let Some(j) = skin.joints.iter().find(|j| **j >= all.len()) {
-                return Err(GeomError::invalid(format!(
-                    "skin {s} refers to the missing node {j} as \
-                    a joint"
-                )));
+                return Err(GeomError::invalid(format!("skin {s} refers to the missing node {j} as a joint")));
             }
             let Some((first, root)) = skin.joints.iter().copied().enumerate().min_by_key(|(_, j)| rank[*j]) else {
                 return Err(GeomError::invalid(format!("skin {s} of the glTF file has no joints")));
@@ -184,8 +181,7 @@ pub(super) fn influences(
                 let (joints, weights) = (set.0.count, set.1.count);
                 if joints != vertices || weights != vertices {
                     return Err(GeomError::invalid(format!(
-                        "{what} has {vertices} vertices, but JOINTS_0 for {joints} and WEIGHTS_0 \
-                         for {weights}"
+                        "{what} has {vertices} vertices, but JOINTS_0 for {joints} and WEIGHTS_0 for {weights}"
                     )));
                 }
                 sets.push(set);

@@ -52,9 +52,7 @@ fn with_data(mut trace: Trace, settings: &Settings, index: u32) -> Result<Simula
     let refuse = |reason: String| Err(CalibrationError::NotSimulable(reason));
     if !trace.code().freezes.is_empty() {
         return refuse(
-            "`freeze` fixes choices at the start of each chain, so their posterior cannot be \
-             checked"
-                .into(),
+            "`freeze` fixes choices at the start of each chain, so their posterior cannot be checked".into(),
         );
     }
     let drawn = trace.replicate(replicating(settings.seed, index, 0))?;
@@ -64,18 +62,14 @@ fn with_data(mut trace: Trace, settings: &Settings, index: u32) -> Result<Simula
             n => format!(" (and {} more)", n - 1),
         };
         return refuse(format!(
-            "data cannot be simulated from the program: {address} is {what}, which has no \
-             sampler{more}"
+            "data cannot be simulated from the program: {address} is {what}, which has no sampler{more}"
         ));
     }
     let all = trace.select(&Selector::All);
     let targets = trace.targets(all).to_vec();
     if let Some(t) = targets.iter().find(|t| trace.dist(**t).is_some_and(|d| d.is_improper())) {
         let address = trace.address(*t);
-        return refuse(format!(
-            "the prior of {address} is improper, so true values cannot be drawn \
-                               from it"
-        ));
+        return refuse(format!("the prior of {address} is improper, so true values cannot be drawn from it"));
     }
     let given = trace.observed();
     if given.is_empty() {
@@ -102,8 +96,7 @@ pub(super) fn same_data(a: &Simulated, b: &Simulated) -> Result<(), CalibrationE
                 // Objects are equal only if they are the same one.
                 Some(p) if !p.value.same(&o.value) && !matches!(p.value, Value::Object(_)) => {
                     return refuse(format!(
-                        "the value observed by {} depends on random choices, so \
-                        it is not data",
+                        "the value observed by {} depends on random choices, so it is not data",
                         o.address
                     ));
                 }

@@ -67,10 +67,7 @@ pub(super) fn simulate(trace: &Trace, draws: Draws, span: Span) -> TraceResult<f
     if let Some((address, what)) = replicate.silent.first() {
         return Err(fail(
             span,
-            format!(
-                "abc simulates all observations, but {address} is {what}, \
-                                       which has no sampler"
-            ),
+            format!("abc simulates all observations, but {address} is {what}, which has no sampler"),
         ));
     }
     let observed = trace.observed();

@@ -41,13 +41,7 @@ impl Delayed {
         twin.commit();
         if let Some(extra) = trace.lacks(&twin) {
             let address = twin.address(extra);
-            return Err(fail(
-                self.span,
-                format!(
-                    "delayed: only the surrogate depends on the choice \
-                {address}"
-                ),
-            ));
+            return Err(fail(self.span, format!("delayed: only the surrogate depends on the choice {address}")));
         }
         Ok(self.twin.insert(twin))
     }

@@ -140,8 +140,7 @@ impl Own {
     /// What is wrong if the map does not lead back to where it began.
     fn does_not_return(&self, forth: &[Mapped], back: &[Mapped]) -> Option<Box<RunError>> {
         let same = |(f, b): (&Mapped, &Mapped)| f.choice.as_ref().map(|c| c.1) == b.choice.as_ref().map(|c| c.1);
-        let hint = "an involution is its own inverse: applied twice, it must return to the \
-                    original values";
+        let hint = "an involution is its own inverse: applied twice, it must return to the original values";
         let wrong = if forth.len() != back.len() || !forth.iter().zip(back).all(same) {
             self.fault("at the new state it maps different choices".into())
         } else {
@@ -194,15 +193,7 @@ impl Own {
             }
         }
         let log = libm::log(matrix.determinant().abs());
-        if log.is_finite() {
-            Ok(log)
-        } else {
-            Err(self.fault(
-                "its Jacobian is singular or not \
-            finite"
-                    .into(),
-            ))
-        }
+        if log.is_finite() { Ok(log) } else { Err(self.fault("its Jacobian is singular or not finite".into())) }
     }
 }
 

@@ -118,8 +118,7 @@ impl Own {
     /// As [`Kernel::step`], and if the body has a map, which only leads from one state to another.
     pub fn leap(&self, trace: &mut Trace, at: &At) -> TraceResult<Option<()>> {
         if maps(&self.declared.body) {
-            let message = "the kernel of a start must propose choices from distributions, not by \
-                           a map";
+            let message = "the kernel of a start must propose choices from distributions, not by a map";
             return Err(fail(self.declared.name.span, message.into()));
         }
         let mut rng = at.stream();
@@ -193,8 +192,7 @@ impl Play<'_> {
                     self.played.all.push(proposed);
                 }
                 _ => {
-                    let message = "a kernel with `propose` may contain only `let`, `for` and \
-                                   `propose`";
+                    let message = "a kernel with `propose` may contain only `let`, `for` and `propose`";
                     let mut e = fail(s.span, message.into());
                     e.hint = Some("kernels that apply other kernels are written without `propose`".into());
                     return Err(e);
@@ -255,15 +253,7 @@ impl Play<'_> {
             return Ok(Image::Choice(address, found));
         };
         let drawn = self.played.drawn.iter().rposition(|d| d.name == *name);
-        let not = || {
-            fail(
-                target.span,
-                format!(
-                    "`{name}` is not an auxiliary variable; propose \
-            {name} ~ …; makes one"
-                ),
-            )
-        };
+        let not = || fail(target.span, format!("`{name}` is not an auxiliary variable; propose {name} ~ …; makes one"));
         drawn.map(Image::Auxiliary).ok_or_else(not)
     }
 
@@ -278,8 +268,7 @@ impl Play<'_> {
         let Some(found) = trace.find(&at) else {
             let mut e = fail(target.span, format!("this state has no choice {at}"));
             e.hint = Some(
-                "a kernel can propose only choices that exist in the current state; mh \
-                           and block can create others"
+                "a kernel can propose only choices that exist in the current state; mh and block can create others"
                     .into(),
             );
             return Err(e);

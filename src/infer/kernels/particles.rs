@@ -98,16 +98,9 @@ impl<W: Way> Independent<W> {
             && !at.adapting
         {
             let name = self.way.name();
-            let mut e = fail(
-                self.span,
-                format!(
-                    "another kernel changed the state between two \
-                steps of {name}"
-                ),
-            );
+            let mut e = fail(self.span, format!("another kernel changed the state between two steps of {name}"));
             e.hint = Some(format!(
-                "{name} draws complete states; its evidence estimate is valid only for the state \
-                 it drew"
+                "{name} draws complete states; its evidence estimate is valid only for the state it drew"
             ));
             return Err(e);
         }

@@ -138,8 +138,7 @@ impl Runner<'_> {
             }
             None if self.instances.len() >= MOST => {
                 let message = format!(
-                    "this run already has {MOST} kernels (a kernel with \
-                                       different arguments counts as another)"
+                    "this run already has {MOST} kernels (a kernel with different arguments counts as another)"
                 );
                 return Err(fail(e.span, message).into());
             }

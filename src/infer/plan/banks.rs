@@ -77,13 +77,7 @@ pub(in crate::infer) fn neighbours(
         Some(k) => match evaluate(k, env)? {
             Value::Num(x) if whole(x).is_some() => x as usize,
             v => {
-                return Err(fail(
-                    k.span,
-                    format!(
-                        "knn: `k` must be a whole number from 1 to \
-                {MOST}, got {v}"
-                    ),
-                ));
+                return Err(fail(k.span, format!("knn: `k` must be a whole number from 1 to {MOST}, got {v}")));
             }
         },
     };

@@ -36,26 +36,13 @@ impl Runner<'_> {
     /// `anneal(from)`: raises the power of the likelihood from 1/from to 1 over a warm-up.
     pub(super) fn anneal(&mut self, e: &Expr, args: &[Arg]) -> Result<Flow, ChainError> {
         if !self.in_warmup {
-            return Err(fail(
-                e.span,
-                "`anneal` is allowed only in `warmup`, whose draws are \
-                                     discarded"
-                    .into(),
-            )
-            .into());
+            return Err(fail(e.span, "`anneal` is allowed only in `warmup`, whose draws are discarded".into()).into());
         }
         let from = match args {
             [a] => match self.value(&a.value)? {
                 Value::Num(t) if t >= 1.0 => t,
                 v => {
-                    return Err(fail(
-                        a.value.span,
-                        format!(
-                            "expected a temperature of at least 1, \
-                        got {v}"
-                        ),
-                    )
-                    .into());
+                    return Err(fail(a.value.span, format!("expected a temperature of at least 1, got {v}")).into());
                 }
             },
             _ => return Err(fail(e.span, "anneal takes one argument, the initial temperature".into()).into()),

@@ -184,10 +184,7 @@ impl<'a> Args<'a> {
     #[doc(hidden)]
     pub fn too_many(&self, n: f64) -> Fault {
         let message = format!("{}: an array of {n} elements is too long", self.builtin.full_name());
-        Fault::new(FaultKind::Limit, message).with_hint(format!(
-            "at most {MOST_ELEMENTS} can be \
-            made in one call"
-        ))
+        Fault::new(FaultKind::Limit, message).with_hint(format!("at most {MOST_ELEMENTS} can be made in one call"))
     }
 
     /// A vector of exactly three numbers, or one number for all three, or a default.

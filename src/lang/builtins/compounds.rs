@@ -22,8 +22,7 @@ pub(super) fn ordered(a: &Args) -> Result<Dist, Fault> {
     let made = match a.get(0) {
         Value::Dist(d) if a.given(1) => dist::Ordered::new(Dist::clone(d), a.count(1)?),
         Value::Dist(_) => {
-            let hint = "ordered(normal(0, 1), 3) is three numbers; list different priors: \
-                        ordered([d1, d2])";
+            let hint = "ordered(normal(0, 1), 3) is three numbers; list different priors: ordered([d1, d2])";
             return Err(Fault::type_error("ordered: with a single distribution, `n` is required").with_hint(hint));
         }
         _ if a.given(1) => {

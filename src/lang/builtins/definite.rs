@@ -116,10 +116,7 @@ fn read(a: &Args) -> Result<Factor, Fault> {
     let (name, n) = (a.builtin.full_name(), m.rows.len());
     if m.width != n {
         let message = format!("{name}: `m` must be square, got {n} x {}", m.width);
-        return Err(Fault::type_error(message).with_hint(
-            "a covariance matrix has one row and one \
-            column per variable",
-        ));
+        return Err(Fault::type_error(message).with_hint("a covariance matrix has one row and one column per variable"));
     }
     let entries = m.rows.iter().flat_map(|r| r.iter());
     let largest = entries.clone().fold(0.0, |most: f64, x| most.max(x.abs()));
@@ -138,10 +135,7 @@ fn read(a: &Args) -> Result<Factor, Fault> {
     }
     let lower = m.rows.iter().enumerate().flat_map(|(i, r)| r[..=i].iter().copied()).collect();
     Factor::new(n, lower).map_err(|rows| {
-        let message = format!(
-            "{name}: `m` must be positive definite, but its leading block of \
-                               {rows} rows is not"
-        );
+        let message = format!("{name}: `m` must be positive definite, but its leading block of {rows} rows is not");
         Fault::domain(message).with_hint(
             "a covariance matrix has positive variances and correlations between -1 and 1; adding \
              a small number to the diagonal helps against rounding errors",

@@ -129,8 +129,7 @@ pub(super) const TABLE: &[Row] = &[
             arg(
                 "eta",
                 Type::Num,
-                "The shape, positive: 1 is uniform over correlation matrices, larger values \
-                 favour independence.",
+                "The shape, positive: 1 is uniform over correlation matrices, larger values favour independence.",
             ),
         ],
         |a| dist::Lkj::new(a.num(0)?, a.num(1)?).map(|d| Dist::Lkj(Arc::new(d))).map_err(fault),
@@ -151,13 +150,7 @@ pub(super) const TABLE: &[Row] = &[
         "mv_normal",
         &[
             arg("mean", Type::Array, "The mean vector."),
-            opt(
-                "cov",
-                Type::Array,
-                "none",
-                "The covariance matrix, an array of rows; give either \
-                `cov` or `chol`.",
-            ),
+            opt("cov", Type::Array, "none", "The covariance matrix, an array of rows; give either `cov` or `chol`."),
             opt("chol", Type::Array, "none", "The lower triangular Cholesky factor of the covariance."),
             opt(
                 "whitened",
@@ -175,45 +168,21 @@ pub(super) const TABLE: &[Row] = &[
             arg("mean", Type::Nums, "The mean: one number, or one per point."),
             arg("cov", Type::Covariance, "The covariance function, such as `sq_exp(length)`."),
             arg("at", Type::Array, "The points."),
-            opt(
-                "centred",
-                Type::Bool,
-                "false",
-                "Centred: stores the values instead of the \
-                underlying white noise.",
-            ),
+            opt("centred", Type::Bool, "false", "Centred: stores the values instead of the underlying white noise."),
             opt("jitter", Type::Num, "1e-6", "Added to the diagonal of the covariance matrix.")
                 .unit("fraction of the variance"),
         ],
         gp,
     ),
-    other(
-        "iid",
-        &[
-            arg("d", Type::Dist, "A distribution."),
-            arg(
-                "n",
-                Type::Int,
-                "The number of \
-        values.",
-            ),
-        ],
-        |a| {
-            let Value::Dist(d) = a.get(0) else { return Err(a.wrong(0, "a distribution")) };
-            dist::Iid::new(Dist::clone(d), a.count(1)?).map(|d| Dist::Iid(Arc::new(d))).map_err(fault)
-        },
-    ),
+    other("iid", &[arg("d", Type::Dist, "A distribution."), arg("n", Type::Int, "The number of values.")], |a| {
+        let Value::Dist(d) = a.get(0) else { return Err(a.wrong(0, "a distribution")) };
+        dist::Iid::new(Dist::clone(d), a.count(1)?).map(|d| Dist::Iid(Arc::new(d))).map_err(fault)
+    }),
     other(
         "ordered",
         &[
             arg("d", Type::Any, "A distribution of continuous numbers, or an array of them."),
-            opt(
-                "n",
-                Type::Int,
-                "none",
-                "The number of values from a single distribution; an \
-                array gives one of each.",
-            ),
+            opt("n", Type::Int, "none", "The number of values from a single distribution; an array gives one of each."),
         ],
         ordered,
     ),
@@ -240,14 +209,10 @@ pub(super) fn notes(name: &str) -> Vec<(&'static str, String)> {
 pub(super) fn fault(e: ParamError) -> Fault {
     let fault = Fault::domain(e.to_string());
     match e.rule {
-        rule if rule.starts_with("must be positive") => fault.with_hint(
-            "for a positive parameter use half_normal, gamma or lognormal as prior, or \
-                        exp of a number",
-        ),
-        "must make a positive definite matrix" => fault.with_hint(
-            "use a larger `jitter`, or add \
-            `+ white(sd)`",
-        ),
+        rule if rule.starts_with("must be positive") => {
+            fault.with_hint("for a positive parameter use half_normal, gamma or lognormal as prior, or exp of a number")
+        }
+        "must make a positive definite matrix" => fault.with_hint("use a larger `jitter`, or add `+ white(sd)`"),
         _ => fault,
     }
 }

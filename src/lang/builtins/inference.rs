@@ -69,8 +69,7 @@ pub(super) const TABLE: &[Row] = &[
         KERNELS,
         &[SEL],
         Type::Kernel,
-        "Draws a selected finite discrete choice from its full conditional, by enumeration of its \
-         values.",
+        "Draws a selected finite discrete choice from its full conditional, by enumeration of its values.",
     ),
     name(
         "elliptical",
@@ -88,15 +87,13 @@ pub(super) const TABLE: &[Row] = &[
                 "width",
                 Type::Num,
                 "learnt",
-                "The width of the initial interval, in the unconstrained space; by default 1, \
-                 adapted in warm-up.",
+                "The width of the initial interval, in the unconstrained space; by default 1, adapted in warm-up.",
             ),
             opt(
                 "doubling",
                 Type::Bool,
                 "false",
-                "Expands the interval by doubling instead of stepping out: for slices much wider \
-                 than `width`.",
+                "Expands the interval by doubling instead of stepping out: for slices much wider than `width`.",
             ),
         ],
         Type::Kernel,
@@ -114,13 +111,7 @@ pub(super) const TABLE: &[Row] = &[
         KERNELS,
         &[
             SEL,
-            opt(
-                "max_depth",
-                Type::Int,
-                "10",
-                "The maximum tree depth: at most 2^max_depth \
-            leapfrog steps.",
-            ),
+            opt("max_depth", Type::Int, "10", "The maximum tree depth: at most 2^max_depth leapfrog steps."),
             MARGINAL,
         ],
         Type::Kernel,
@@ -164,8 +155,7 @@ pub(super) const TABLE: &[Row] = &[
                 "hottest",
                 Type::Num,
                 "0.01",
-                "The lowest power of the likelihood; warm-up adapts \
-                the ladder of temperatures.",
+                "The lowest power of the likelihood; warm-up adapts the ladder of temperatures.",
             ),
         ],
         Type::Kernel,
@@ -210,30 +200,21 @@ pub(super) const TABLE: &[Row] = &[
                 "tries",
                 Type::Int,
                 "200",
-                "The number of draws from the prior, from which \
-                starting points are chosen.",
+                "The number of draws from the prior, from which starting points are chosen.",
             ),
-            opt(
-                "keep",
-                Type::Int,
-                "16",
-                "The number of these, the most probable, that climb to a \
-                mode.",
-            ),
+            opt("keep", Type::Int, "16", "The number of these, the most probable, that climb to a mode."),
             opt("steps", Type::Int, "60", "The maximum number of optimisation steps per climb."),
             opt(
                 "first",
                 Type::Selection,
                 "none",
-                "Choices that are optimised alone for some steps in each draw, before draws are \
-                 compared.",
+                "Choices that are optimised alone for some steps in each draw, before draws are compared.",
             ),
             opt(
                 "at",
                 Type::Selection,
                 "none",
-                "Observations that are replaced by their coarse surrogates during the search for \
-                 modes.",
+                "Observations that are replaced by their coarse surrogates during the search for modes.",
             ),
         ],
         Type::Kernel,
@@ -294,8 +275,7 @@ pub(super) const TABLE: &[Row] = &[
                 "keep",
                 Type::Int,
                 "1",
-                "The number of best draws to start a population, which `anneal` reduces to one \
-                 state.",
+                "The number of best draws to start a population, which `anneal` reduces to one state.",
             ),
             opt(
                 "from",
@@ -316,14 +296,7 @@ pub(super) const TABLE: &[Row] = &[
         "The current value of a choice, in user kernels and conditions.",
     ),
     name("elapsed", MONITORS, &[], Type::Num, "The time since the chain started, in seconds."),
-    name(
-        "steps",
-        MONITORS,
-        &[],
-        Type::Int,
-        "The number of kernel applications in this chain so \
-        far.",
-    ),
+    name("steps", MONITORS, &[], Type::Int, "The number of kernel applications in this chain so far."),
     name("acceptance", MONITORS, &[], Type::Num, "The acceptance rate of this chain after warm-up."),
     name(
         "rhat",

@@ -146,15 +146,7 @@ pub(super) const TABLE: &[Row] = &[
     function(
         "zip",
         SECTION,
-        &[
-            arg("xs", Type::Array, "An array."),
-            arg(
-                "ys",
-                Type::Array,
-                "Another array of the same \
-            length.",
-            ),
-        ],
+        &[arg("xs", Type::Array, "An array."), arg("ys", Type::Array, "Another array of the same length.")],
         Type::Array,
         "The array of the pairs `[x, y]`.",
         |a| {
@@ -226,8 +218,7 @@ pub(super) const TABLE: &[Row] = &[
             arg("b", Type::Any, "The result where it is false."),
         ],
         Type::Any,
-        "`a` where the condition is true, `b` elsewhere, element by element; both are always \
-         computed.",
+        "`a` where the condition is true, `b` elsewhere, element by element; both are always computed.",
         |a| select(a, a.get(0), a.get(1), a.get(2)),
     )
     .pull(|a, z, by| {

@@ -10,15 +10,7 @@ use smallvec::smallvec;
 const SECTION: &str = "Sums and statistics";
 
 const XS: &[Arg] = &[arg("xs", Type::Array, "Numbers; bools count 0 and 1.")];
-const PAIR: &[Arg] = &[
-    arg("xs", Type::Array, "Numbers."),
-    arg(
-        "ys",
-        Type::Array,
-        "The same \
-    number of numbers.",
-    ),
-];
+const PAIR: &[Arg] = &[arg("xs", Type::Array, "Numbers."), arg("ys", Type::Array, "The same number of numbers.")];
 
 /// The row of a function of at least so many numbers.
 macro_rules! of_all {
@@ -75,8 +67,7 @@ pub(super) const TABLE: &[Row] = &[
         SECTION,
         PAIR,
         Type::Num,
-        "The dot product: the sum of the products of \
-        corresponding elements.",
+        "The dot product: the sum of the products of corresponding elements.",
         |a| a.number_pair(0, 1).map(|(xs, ys)| Value::Num(dot(&xs, &ys))),
     )
     .pull(|a, _, by| {

@@ -212,10 +212,7 @@ impl Lowerer<'_> {
             let message = format!("{} has no field `{}`", shown(value.ty), field.node);
             let e = self.error(message, base.span, format!("this is {}", shown(value.ty)));
             match value.ty {
-                Type::Array => e.hint_also(
-                    "elements of an array are indexed by number: a[0], \
-                    a[1], …",
-                ),
+                Type::Array => e.hint_also("elements of an array are indexed by number: a[0], a[1], …"),
                 Type::Function => e.hint_also(format!("call it first: f(…).{}", field.node)),
                 _ => {}
             }

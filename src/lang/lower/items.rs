@@ -55,10 +55,7 @@ impl Lowerer<'_> {
                                 let message = format!("the namespace `{}` is declared twice", alias.node);
                                 let e = self.error(message, alias.span, "declared again here");
                                 e.point_at(old.span, "first declared here");
-                                e.hint_also(
-                                    "rename one of them after `as`, or include the file \
-                                    once",
-                                );
+                                e.hint_also("rename one of them after `as`, or include the file once");
                             }
                             let outer = std::mem::replace(&mut self.module, module);
                             self.unit(included);

@@ -90,13 +90,8 @@ impl Lowerer<'_> {
             }
             KStmtKind::StopWhen(e) => {
                 if !around.in_loop {
-                    self.error(
-                        "`stop when` is allowed only in a loop, which it ends",
-                        s.span,
-                        "not \
-                        in a loop",
-                    )
-                    .hint_also("repeat 1000 { … stop when …; }");
+                    self.error("`stop when` is allowed only in a loop, which it ends", s.span, "not in a loop")
+                        .hint_also("repeat 1000 { … stop when …; }");
                 }
                 self.plan_expr(e, around);
             }
@@ -196,11 +191,7 @@ impl Lowerer<'_> {
                     self.error(
                         format!("`{name}` is not a kernel"),
                         callee.span,
-                        format!(
-                            "it \
-                        returns {}",
-                            shown(b.returns)
-                        ),
+                        format!("it returns {}", shown(b.returns)),
                     );
                     return;
                 }

@@ -19,10 +19,9 @@ impl Rules<'_, '_> {
             Token::Semi => self.semicolon(),
             Token::Hash => self.hash(),
             Token::Str(_) => self.string(),
-            Token::Arrow => hint(
-                "a function is written `fn(x) { … }`; `weight => kernel;` is \
-                                  used only in `mix { … }`",
-            ),
+            Token::Arrow => {
+                hint("a function is written `fn(x) { … }`; `weight => kernel;` is used only in `mix { … }`")
+            }
             Token::Plus if self.expects_expression() => hint("there is no unary `+`"),
             Token::Range if !self.expects_expression() => hint("`..` does not chain, and `a .. b` has no step"),
             Token::In if self.expects_operator() => hint("`in` is used only in `for x in xs { … }`"),
@@ -54,10 +53,7 @@ impl Rules<'_, '_> {
                 let others = "`x[k] ~ d;` makes a random choice; an array is made by `map(f, xs)`";
                 say("values do not change", "", format!("{others}; {}", recurrence(name)))
             }
-            Token::Fn if self.expects_block() => hint(
-                "write the body of a function in braces: \
-                `fn f(x) { x + 1 }`",
-            ),
+            Token::Fn if self.expects_block() => hint("write the body of a function in braces: `fn f(x) { x + 1 }`"),
             _ if self.expects_name_only() => None,
             _ => say("`=` does not compare", "write `==`", "`a == b` compares; `let x = e;` binds one name"),
         }
@@ -215,10 +211,7 @@ impl Rules<'_, '_> {
         let found = self.found()?;
         if *found == Token::Comma && !self.expects_expression() {
             return match self.first()? {
-                Token::Let | Token::Assume | Token::Predict => hint(
-                    "each name needs its own \
-                    statement",
-                ),
+                Token::Let | Token::Assume | Token::Predict => hint("each name needs its own statement"),
                 Token::Name(_) => hint("each random choice needs its own statement"),
                 _ => None,
             };

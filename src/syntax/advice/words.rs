@@ -76,8 +76,7 @@ impl Rules<'_, '_> {
                 return say(
                     format!("`{word}` is allowed only at the top level"),
                     "this is inside a block",
-                    "move \
-                    it out of the block",
+                    "move it out of the block",
                 );
             }
         }

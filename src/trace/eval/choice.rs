@@ -234,8 +234,7 @@ impl Graph {
 
     fn improper(&self, code: &Code, n: NodeId, dist: &Dist) -> Failure {
         let message = format!("`{}` is improper, so it cannot be sampled", dist.name());
-        let hint = "use `drift` on it, observe something that depends on it, or give it a proper \
-                    prior";
+        let hint = "use `drift` on it, observe something that depends on it, or give it a proper prior";
         self.fail(code, n, FaultKind::Domain, message, Some(hint.into()))
     }
 

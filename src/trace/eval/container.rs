@@ -107,15 +107,7 @@ impl Graph {
                         f = self.nodes[self.frames[f as usize].owner as usize].frame;
                     }
                     let key = self.frames[f as usize].key.clone();
-                    key.ok_or_else(|| {
-                        self.type_error(
-                            code,
-                            n,
-                            "this iteration of the loop has no \
-                        key"
-                            .into(),
-                        )
-                    })?
+                    key.ok_or_else(|| self.type_error(code, n, "this iteration of the loop has no key".into()))?
                 }
                 SourceKey::Operand(o) => {
                     if let Some(m) = self.unready(frame, *o) {

@@ -66,11 +66,7 @@ impl Graph {
             }
             v @ (Value::Array(_) | Value::List(_)) => (v.clone(), for_keys(v)),
             v => {
-                let message = format!(
-                    "`for` iterates over an array, a range or a record, not \
-                                       over {}",
-                    v.type_name()
-                );
+                let message = format!("`for` iterates over an array, a range or a record, not over {}", v.type_name());
                 return Err(self.type_error(code, n, message));
             }
         };

@@ -110,14 +110,8 @@ impl Reverse<'_> {
             }
             if part.is_unknown() {
                 let name = builtin.args.get(i).or(builtin.args.last()).map_or("", |a| &*a.name);
-                return Err(self.no_derivative(
-                    n,
-                    &format!(
-                        "`{}`, as a function of its argument \
-                    `{name}`,",
-                        builtin.full_name()
-                    ),
-                ));
+                return Err(self
+                    .no_derivative(n, &format!("`{}`, as a function of its argument `{name}`,", builtin.full_name())));
             }
             self.give_node(source, part);
         }

@@ -196,11 +196,7 @@ impl Reverse<'_> {
             return Ok(());
         }
         let Some(elements) = self.gathered(n) else {
-            return Err(self.no_derivative(
-                n,
-                "the result \
-            of this map",
-            ));
+            return Err(self.no_derivative(n, "the result of this map"));
         };
         for (i, d) in elements.into_iter().enumerate() {
             let part = match &self.graph.nodes[n as usize].value {

@@ -143,8 +143,7 @@ impl Trace {
             let joins = m.partition.joins();
             let mut table = Table::new(m, &m.partition).map_err(|i| {
                 let what = format!(
-                    "it is coupled with other choices, and together they have more \
-                                    than {MOST_VALUES} joint values"
+                    "it is coupled with other choices, and together they have more than {MOST_VALUES} joint values"
                 );
                 self.cannot_sum(m.sites[i], &what)
             })?;
@@ -171,11 +170,7 @@ impl Trace {
                 match self.moved_support(m) {
                     Some(_) if !at.is_empty() => return Ok(Explored::Nowhere),
                     Some(t) => {
-                        return Err(self.cannot_sum(
-                            t,
-                            "its possible values depend on other \
-                        choices",
-                        ));
+                        return Err(self.cannot_sum(t, "its possible values depend on other choices"));
                     }
                     None => {}
                 }
@@ -226,8 +221,7 @@ impl Trace {
                 match new {
                     Some(node) => Err(self.cannot_sum(
                         Target { node, element: NONE },
-                        "it is improper and \
-                            is created together with other choices",
+                        "it is improper and is created together with other choices",
                     )),
                     None => Ok(Err(label)),
                 }

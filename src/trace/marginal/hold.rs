@@ -85,11 +85,7 @@ impl Trace {
                 }
                 Explored::Structure(changes) => {
                     if drawn || self.propose(&changes, draws)?.appeared == 0 {
-                        return Err(self.cannot_sum(
-                            m.sites[0],
-                            "other choices are created or \
-                            removed with it",
-                        ));
+                        return Err(self.cannot_sum(m.sites[0], "other choices are created or removed with it"));
                     }
                     self.commit();
                     self.hold_all(held)?;
@@ -122,13 +118,7 @@ impl Trace {
 
     /// Enters the choices that there are now.
     fn take_up(&self, m: &mut Marginal, sites: Selection, moving: Selection) -> TraceResult<()> {
-        let not = |t: &Target| {
-            self.cannot_sum(
-                *t,
-                "it is not a discrete choice with finitely \
-            many values",
-            )
-        };
+        let not = |t: &Target| self.cannot_sum(*t, "it is not a discrete choice with finitely many values");
         let known: FxHashSet<Target> = m.sites.iter().copied().collect();
         for t in self.targets(sites).iter().filter(|t| !known.contains(t)) {
             let support = self.dist(*t).map(|d| d.stored_support()).filter(Support::is_finite).ok_or_else(|| not(t))?;

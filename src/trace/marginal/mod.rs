@@ -197,11 +197,7 @@ impl Trace {
             span: self.span(t.node),
             address: self.address(t),
             calls: Vec::new(),
-            hint: Some(
-                "select only finite discrete choices with `marginal`, and update the \
-                        others with gibbs"
-                    .into(),
-            ),
+            hint: Some("select only finite discrete choices with `marginal`, and update the others with gibbs".into()),
         })
     }
 }

@@ -93,10 +93,8 @@ fn parse(text: impl BufRead) -> Result<Forest, String> {
                 };
                 let room = |n: usize, most: usize| match n < most {
                     true => Ok(()),
-                    false => Err(tokens.wrong(format!(
-                        "the forest is too large; at most {most} numbers \
-                            of one kind are supported"
-                    ))),
+                    false => Err(tokens
+                        .wrong(format!("the forest is too large; at most {most} numbers of one kind are supported"))),
                 };
                 match at {
                     Some(Part::Options) => {
@@ -221,8 +219,7 @@ fn checked(raw: Raw) -> Result<Forest, String> {
     }
     if begins.windows(2).any(|w| w[0] > w[1]) || begins.last().is_some_and(|e| *e as usize > raw.pixels.len()) {
         return Err(format!(
-            "`edgeBoundaries` must be ascending, up to at most {}, the length of \
-                            `edgeBins`",
+            "`edgeBoundaries` must be ascending, up to at most {}, the length of `edgeBins`",
             raw.pixels.len()
         ));
     }

@@ -45,10 +45,7 @@ impl<R: BufRead> Tokens<R> {
             return match self.from.fill_buf() {
                 Ok(bytes) => Ok(bytes.first().copied()),
                 Err(e) if e.kind() == ErrorKind::Interrupted => continue,
-                Err(e) if e.kind() == ErrorKind::UnexpectedEof => Err(self.wrong(
-                    "the file is \
-                    truncated",
-                )),
+                Err(e) if e.kind() == ErrorKind::UnexpectedEof => Err(self.wrong("the file is truncated")),
                 Err(e) => Err(self.wrong(format!("cannot decompress it: {e}"))),
             };
         }

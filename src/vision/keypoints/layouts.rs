@@ -92,10 +92,7 @@ fn named(all: &Node) -> Result<Keypoints, KeypointsError> {
         };
         let name = Arc::from(usual(name));
         if points.iter().any(|p| p.name == name) {
-            return Err(n.wrong(&format!(
-                "given only once, but `{name}` also occurs in another \
-                spelling"
-            )));
+            return Err(n.wrong(&format!("given only once, but `{name}` also occurs in another spelling")));
         }
         let (x, y) = (x.number("a number of pixels")?, y.number("a number of pixels")?);
         points.push(Keypoint::new(name, [x, y], confidence));

@@ -35,26 +35,13 @@ fn many_by_id() {
     assert_eq!(p.ids().collect::<Vec<_>>(), ["a", "b", "c"]);
     assert_eq!(points(&p.pick(Some("a"), Some("b")).unwrap()), [("nose", 1.0, 2.0, 1.0)]);
     assert!(p.pick(None, Some("b")).unwrap().is_empty());
-    assert_eq!(
-        p.pick(Some("d"), None).unwrap_err().to_string(),
-        "no person has the id `d`; there \
-        are a, b, c"
-    );
+    assert_eq!(p.pick(Some("d"), None).unwrap_err().to_string(), "no person has the id `d`; there are a, b, c");
     let choose = "add `#` and an id to the file name to choose one";
-    assert_eq!(
-        p.pick(None, None).unwrap_err().to_string(),
-        format!(
-            "it contains 3 people: a, b, \
-        c; {choose}"
-        )
-    );
+    assert_eq!(p.pick(None, None).unwrap_err().to_string(), format!("it contains 3 people: a, b, c; {choose}"));
     let message = p.pick(None, Some("photo")).unwrap_err().to_string();
     assert_eq!(
         message,
-        format!(
-            "it contains 3 people: a, b, c; none of them has the name of the picture, \
-                 `photo`; {choose}"
-        )
+        format!("it contains 3 people: a, b, c; none of them has the name of the picture, `photo`; {choose}")
     );
     let many: Value =
         (0..9).map(|i| (format!("p{i}"), json!({ "keypoints": {} }))).collect::<serde_json::Map<_, _>>().into();
@@ -145,8 +132,7 @@ fn what_is_wrong_is_said_with_its_place() {
         (json!({ "nose": [1, 2, 1.5] }), "`nose[2]` must be a confidence from 0 to 1, got 1.5"),
         (
             json!({ "l_hip": [1, 2], "left_hip": [1, 2] }),
-            "`left_hip` must be given only once, but `l_hip` also occurs in another spelling, got \
-             a list of 2",
+            "`left_hip` must be given only once, but `l_hip` also occurs in another spelling, got a list of 2",
         ),
         (json!({ "a": { "keypoints": {} }, "b": 3 }), "`b` must be an object with `keypoints`, got 3"),
         (

@@ -23,11 +23,7 @@ pub fn matching(
     for p in detected.points() {
         let at = landmarks.iter().position(|l| *l == &*p.name);
         if at.is_none() && !may_lack(&p.name) {
-            let e = KeypointsError::new(format!(
-                "`{}` was detected, but the scene has no such \
-                landmark",
-                p.name
-            ));
+            let e = KeypointsError::new(format!("`{}` was detected, but the scene has no such landmark", p.name));
             return Err(match nearest(&p.name, landmarks) {
                 _ if landmarks.is_empty() => e.hint("it has no landmarks"),
                 Some(n) => e.hint(format!("did you mean `{n}`? It has {}", first(landmarks.iter().copied(), LISTED))),
@@ -64,11 +60,7 @@ mod tests {
             "`l_wirst` was detected, but the scene has no such landmark; did you mean `l_wrist`? \
              It has l_wrist, nose, tail"
         );
-        assert_eq!(
-            said(&["wing"], &["a"]),
-            "`wing` was detected, but the scene has no such \
-            landmark; it has a"
-        );
+        assert_eq!(said(&["wing"], &["a"]), "`wing` was detected, but the scene has no such landmark; it has a");
         assert_eq!(
             said(&["l_hip"], &[]),
             "`l_hip` was detected, but the scene has no such landmark; it has no landmarks"

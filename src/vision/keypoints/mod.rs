@@ -101,8 +101,7 @@ impl Keypoints {
             let sound = |o: &Elsewhere| o.x.is_finite() && o.y.is_finite() && o.weight > 0.0 && o.weight.is_finite();
             if !p.others.iter().all(sound) {
                 return Err(KeypointsError::new(format!(
-                    "an alternative position of the keypoint \
-                    `{}` is not finite",
+                    "an alternative position of the keypoint `{}` is not finite",
                     p.name
                 )));
             }

@@ -70,10 +70,7 @@ impl People {
             ([one], _) => Ok(one.keypoints.clone()),
             (_, Some(stem)) => match self.find(stem)? {
                 Some(p) => Ok(p.keypoints.clone()),
-                None => Err(self.several(&format!(
-                    "; none of them has the name of the picture, \
-                    `{stem}`"
-                ))),
+                None => Err(self.several(&format!("; none of them has the name of the picture, `{stem}`"))),
             },
             _ => Err(self.several("")),
         }
@@ -93,10 +90,7 @@ impl People {
             _ => {
                 let ids = first(found.iter().map(|p| p.id.as_str()), 8);
                 let message = format!("there are {} people in the picture `{id}`: {ids}", found.len());
-                Err(KeypointsError::new(message).hint(
-                    "add `#` and an id to the file name to \
-                    choose one",
-                ))
+                Err(KeypointsError::new(message).hint("add `#` and an id to the file name to choose one"))
             }
         }
     }

@@ -108,12 +108,7 @@ impl Network {
             given.map_err(|e| wrong(format!("the network failed: {e}")))
         })?;
         let value = given.into_iter().next().ok_or_else(|| wrong("the network produced no output"))?;
-        let (shape, mut values) = numbers(value).ok_or_else(|| {
-            self.unfit(
-                "is not in single \
-            precision",
-            )
-        })?;
+        let (shape, mut values) = numbers(value).ok_or_else(|| self.unfit("is not in single precision"))?;
         let (width, height) = side_lengths(&shape, (width, height)).map_err(|why| self.unfit(&why))?;
         if values.iter().any(|v| !v.is_finite()) {
             return Err(self.unfit("has values that are not finite"));
@@ -124,8 +119,7 @@ impl Network {
         let (least, most) = values.iter().fold((0.0f32, 0.0f32), |(a, b), v| (a.min(*v), b.max(*v)));
         if least < -0.01 || most > 1.01 {
             return Err(self.unfit(&format!(
-                "has values from {least} to {most}, not from 0 to 1; if they are log odds, set \
-                 logits = true"
+                "has values from {least} to {most}, not from 0 to 1; if they are log odds, set logits = true"
             )));
         }
         Ok(SoftMap { width, height, values, shows: self.options.shows })
@@ -250,8 +244,7 @@ fn side_lengths(shape: &[usize], (width, height): (u32, u32)) -> Result<(u32, u3
     // A pixel more or less comes from rounding.
     if w == 0 || h == 0 || w > SIDE || h > SIDE || a.abs_diff(b) > u64::from(width.max(height)) {
         return Err(format!(
-            "is {w} x {h} pixels, which does not match the aspect ratio of the \
-                            picture, {width} x {height}"
+            "is {w} x {h} pixels, which does not match the aspect ratio of the picture, {width} x {height}"
         ));
     }
     Ok((w as u32, h as u32))

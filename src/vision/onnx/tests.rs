@@ -159,16 +159,8 @@ fn outputs_by_place_and_by_name() {
     assert!((of(Output::Number(2)).unwrap() - sigmoid).abs() < 1e-5);
     assert_eq!(of(Output::Number(1)).unwrap(), 0.5);
     assert_eq!(of(Output::Named("side".into())).unwrap(), 0.5);
-    assert_eq!(
-        of(Output::Number(3)).unwrap_err(),
-        "the network has no output 3; it has 2: side, \
-        fused"
-    );
-    assert_eq!(
-        of(Output::Named("d0".into())).unwrap_err(),
-        "the network has no output `d0`; it \
-        has side, fused"
-    );
+    assert_eq!(of(Output::Number(3)).unwrap_err(), "the network has no output 3; it has 2: side, fused");
+    assert_eq!(of(Output::Named("d0".into())).unwrap_err(), "the network has no output `d0`; it has side, fused");
 }
 
 #[test]
@@ -181,8 +173,7 @@ fn values_beyond_1_are_log_odds_or_an_error() {
     let why = of(false).unwrap_err();
     assert_eq!(
         why,
-        "the output `fused` has values from -4 to 0, not from 0 to 1; if they are log odds, set \
-         logits = true"
+        "the output `fused` has values from -4 to 0, not from 0 to 1; if they are log odds, set logits = true"
     );
     assert!((of(true).unwrap() - 1.0 / (1.0 + libm::expf(4.0))).abs() < 1e-6);
     let endless = weighted(3, SIDES, &[f32::INFINITY, 0.0, 0.0], "Identity");
@@ -277,8 +268,7 @@ fn networks_that_are_of_no_use() {
     let why = network(&thin, &plain).unwrap_err();
     assert_eq!(
         why,
-        "the output `fused` is 32 x 64 pixels, which does not match the aspect ratio \
-                     of the picture, 64 x 64"
+        "the output `fused` is 32 x 64 pixels, which does not match the aspect ratio of the picture, 64 x 64"
     );
 }
 

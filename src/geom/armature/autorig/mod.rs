@@ -60,12 +60,8 @@ pub fn by_skeleton(mesh: &Mesh, most: usize) -> Result<Armature, GeomError> {
         return Err(GeomError::invalid(format!("a skeleton needs a closed mesh; this one has {open} open edges")));
     }
     let (positions, triangles) = welded(mesh);
-    let grid = voxels::Grid::inside(&positions, &triangles).ok_or_else(|| {
-        GeomError::invalid(
-            "a skeleton needs a mesh with an interior; this one is \
-            too thin",
-        )
-    })?;
+    let grid = voxels::Grid::inside(&positions, &triangles)
+        .ok_or_else(|| GeomError::invalid("a skeleton needs a mesh with an interior; this one is too thin"))?;
     let bones = tree::bones(skeleton::curves(&grid), grid.cell(), most);
     let influences = skin::by_distance(&positions, &bones);
     finish(bones, positions, triangles, influences)

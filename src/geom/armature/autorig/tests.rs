@@ -191,11 +191,7 @@ fn what_cannot_be_rigged_is_refused() {
     let open = tri([Vec3::ZERO, Vec3::X, Vec3::Y]);
     assert_eq!(e(by_skeleton(&open, 16)), "a skeleton needs a closed mesh; this one has 3 open edges");
     let thin = cuboid(DVec3::new(1.0, 1.0, 1e-4)).unwrap();
-    assert_eq!(
-        e(by_skeleton(&thin, 16)),
-        "a skeleton needs a mesh with an interior; this one is \
-        too thin"
-    );
+    assert_eq!(e(by_skeleton(&thin, 16)), "a skeleton needs a mesh with an interior; this one is too thin");
     let many = sphere(1.0, 256).unwrap();
     assert!(many.topology.triangles.len() > MOST_GROUPED_TRIANGLES);
     assert!(e(by_groups(&many)).contains("at most 20000 triangles"));

@@ -111,8 +111,7 @@ impl System<'_> {
                 let message = "the bounds of a choice depend on a choice that is summed out";
                 return Err(fail(Default::default(), message.into()));
             } else if rest.to_bits() != base.to_bits() {
-                let message = "internal error: an undetected dependence of a score on choices that are \
-                     summed out; please report this";
+                let message = "internal error: an undetected dependence of a score on choices that are summed out; please report this";
                 return Err(fail(Default::default(), message.into()));
             }
             for (((c, t), seen), v) in conditional.iter_mut().zip(&terms).zip(sums.seen()).zip(values) {

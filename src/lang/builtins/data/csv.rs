@@ -17,9 +17,9 @@ pub(super) fn parse(bytes: &[u8]) -> Result<Value, String> {
     let mut rows = rows(text, separator(text))?.into_iter();
     let Some((_, header)) = rows.next() else { return Err("the table is empty".into()) };
     if header.iter().all(|h| h.trim().parse::<f64>().is_ok()) {
-        return Err("line 1: the first line must be a header with the column names, but it \
-                    contains only numbers"
-            .into());
+        return Err(
+            "line 1: the first line must be a header with the column names, but it contains only numbers".into()
+        );
     }
     let rows: Vec<Row> = rows.collect();
     if let Some((line, row)) = rows.iter().find(|(_, row)| row.len() != header.len()) {
@@ -156,8 +156,7 @@ mod tests {
         assert_eq!(read(""), "the table is empty");
         assert_eq!(
             read("1,2\n3,4"),
-            "line 1: the first line must be a header with the column \
-                                      names, but it contains only numbers"
+            "line 1: the first line must be a header with the column names, but it contains only numbers"
         );
         assert_eq!(read("x,y\n1,2\n3"), "line 3: 1 fields, but the header has 2");
         assert_eq!(read("x,x\n1,2"), "line 1: there are two columns `x`");

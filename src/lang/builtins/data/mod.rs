@@ -29,41 +29,16 @@ const FILE: &[Arg] = &[arg("file", Type::Str, "The path, relative to the program
 const SHAPE: &[Arg] = &[
     arg("file", Type::Str, "The path, relative to the program's folder."),
     opt("up", Type::Str, "\"y\"", "The file's up axis: \"x\", \"y\" or \"z\"; it is rotated to +y."),
-    opt(
-        "unit",
-        Type::Num,
-        "1",
-        "The length of the file's unit in scene units: 0.01 for \
-                                 centimetres.",
-    )
-    .unit("m"),
+    opt("unit", Type::Num, "1", "The length of the file's unit in scene units: 0.01 for centimetres.").unit("m"),
 ];
 
 const NETWORK: &[Arg] = &[
     opt("file", Type::Str, "none", "The path, relative to the program's folder."),
-    opt(
-        "colours",
-        Type::Str,
-        "\"rgb\"",
-        "The order of the network's input channels, \"rgb\" or \
-        \"bgr\".",
-    ),
-    opt(
-        "white",
-        Type::Num,
-        "1",
-        "The value of white, above 0; the network's input is (value - \
-                                  mean) / spread.",
-    ),
+    opt("colours", Type::Str, "\"rgb\"", "The order of the network's input channels, \"rgb\" or \"bgr\"."),
+    opt("white", Type::Num, "1", "The value of white, above 0; the network's input is (value - mean) / spread."),
     opt("mean", Type::Any, "0", "The mean to subtract: a number, or one per channel."),
     opt("spread", Type::Any, "1", "The divisor: a number, or one per channel."),
-    opt(
-        "output",
-        Type::Any,
-        "the last",
-        "The output to use as the map: its name, or its number \
-        from 1.",
-    ),
+    opt("output", Type::Any, "the last", "The output to use as the map: its name, or its number from 1."),
     opt("logits", Type::Bool, "false", "Whether the map holds log odds instead of probabilities."),
     opt("shows", Type::Str, "\"contours\"", "What the map shows, \"contours\" or \"objects\"."),
 ];

@@ -99,14 +99,7 @@ fn set_network(network: &mut NetworkOptions, name: &str, value: &Expr) -> Result
         },
         _ => number(value).map(|x| [x; 3]),
     };
-    let each = || {
-        each().ok_or_else(|| {
-            format!(
-                "`{name}` must be a literal number or a list of \
-        three"
-            )
-        })
-    };
+    let each = || each().ok_or_else(|| format!("`{name}` must be a literal number or a list of three"));
     match name {
         "colours" => network.bgr = word(["rgb", "bgr"])?,
         "shows" => network.shows = if word(["contours", "objects"])? { Shows::Objects } else { Shows::Contours },

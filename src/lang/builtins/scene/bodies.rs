@@ -27,20 +27,8 @@ pub(super) const TABLE: &[Row] = &[
                  rotation vector (three numbers) for each joint.",
             )
             .unit("radians; the mesh's units"),
-            opt(
-                "stop_at",
-                Type::Array,
-                "[]",
-                "Joints at which the effect of a location further \
-                down the chain ends.",
-            ),
-            opt(
-                "inherit_scale",
-                Type::Bool,
-                "false",
-                "Whether a joint's scale also applies to \
-                its child joints.",
-            ),
+            opt("stop_at", Type::Array, "[]", "Joints at which the effect of a location further down the chain ends."),
+            opt("inherit_scale", Type::Bool, "false", "Whether a joint's scale also applies to its child joints."),
         ],
         SOLID,
         "The armature's mesh in a pose (linear blend skinning): M[j] = M[parent] T(head + d) R S \
@@ -96,8 +84,7 @@ pub(super) const TABLE: &[Row] = &[
             arg(
                 "factors",
                 Type::Record,
-                "For each joint: the stretch factor of its bone, or three factors along the rest \
-                 axes; each above 0.",
+                "For each joint: the stretch factor of its bone, or three factors along the rest axes; each above 0.",
             ),
         ],
         ARMATURE,
@@ -237,8 +224,7 @@ fn affine(a: &Args, placement: &AffineValue) -> Result<JointPose, Fault> {
     if !(off < 1e-9 && turn.determinant() > 0.0) {
         let name = a.builtin.full_name();
         return Err(Fault::domain(format!(
-            "{name}: a joint's placement may rotate and scale, but \
-            not shear or mirror"
+            "{name}: a joint's placement may rotate and scale, but not shear or mirror"
         )));
     }
     Ok(JointPose { location: placement.0.0.translation, turn: Turn::Matrix(turn), scale })

@@ -14,19 +14,13 @@ pub(super) const TABLE: &[Row] = &[native(
     "candidates",
     "Finding",
     &[
-        arg(
-            "photo",
-            IMAGE,
-            "The photograph; from a contour map alone, the enclosed regions are \
-                             used.",
-        ),
+        arg("photo", IMAGE, "The photograph; from a contour map alone, the enclosed regions are used."),
         opt("most", Type::Int, "20", "The maximum number of candidates, 1 to 64."),
         opt(
             "size",
             Type::Int,
             "128",
-            "The longer side of the picture that is analysed, 32 to \
-                                       512; 256 for a contour map.",
+            "The longer side of the picture that is analysed, 32 to 512; 256 for a contour map.",
         )
         .unit("pixels"),
         opt("camera", CAMERA, "the run's", "The camera; by default, that of the run."),

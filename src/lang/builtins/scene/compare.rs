@@ -30,35 +30,21 @@ pub(super) const TABLE: &[Row] = &[
         &[
             SEEN,
             SIZE,
-            opt(
-                "foreground",
-                Type::Num,
-                "0.75",
-                "The fraction of rendered contour that produces \
-                an observed edge.",
-            ),
+            opt("foreground", Type::Num, "0.75", "The fraction of rendered contour that produces an observed edge."),
             opt("sd", Type::Num, "0.4", "The standard deviation of its distance to that edge.")
                 .unit("percent of the diagonal"),
             opt("truncate", Type::Num, "3.3", "The distance beyond which an edge is not matched.")
                 .unit("percent of the diagonal"),
-            opt(
-                "credit",
-                Type::Num,
-                "2",
-                "The number of times that one observed edge can be \
-                matched.",
-            ),
+            opt("credit", Type::Num, "2", "The number of times that one observed edge can be matched."),
             opt(
                 "weight",
                 Type::Num,
                 "0.5",
-                "The power of the likelihood ratio per two pixels of \
-                contour, in a picture of 256 pixels.",
+                "The power of the likelihood ratio per two pixels of contour, in a picture of 256 pixels.",
             ),
         ],
         Type::Likelihood,
-        "The likelihood ratio of the observed contours: object against clutter. The default for \
-         photographs.",
+        "The likelihood ratio of the observed contours: object against clutter. The default for photographs.",
         contour,
     )
     .pull(|_, _, by| Some(by_view(by.clone(), 6))),
@@ -72,25 +58,12 @@ pub(super) const TABLE: &[Row] = &[
                 "mode",
                 Type::Str,
                 "\"mean\"",
-                "\"mean\": one term for the mean distance, as in the paper; \"sum\": one term per \
-                 percent of contour.",
+                "\"mean\": one term for the mean distance, as in the paper; \"sum\": one term per percent of contour.",
             ),
-            opt(
-                "symmetric",
-                Type::Bool,
-                "false",
-                "Also measures from the observed to the \
-                rendered contours.",
-            ),
+            opt("symmetric", Type::Bool, "false", "Also measures from the observed to the rendered contours."),
             opt("truncate", Type::Num, "none", "Truncates distances at this value.").unit("percent of the diagonal"),
-            opt(
-                "oriented",
-                Type::Num,
-                "none",
-                "The distance equivalent to an orientation \
-                difference of one radian.",
-            )
-            .unit("percent of the diagonal"),
+            opt("oriented", Type::Num, "none", "The distance equivalent to an orientation difference of one radian.")
+                .unit("percent of the diagonal"),
             SIZE,
         ],
         Type::Likelihood,
@@ -108,20 +81,8 @@ pub(super) const TABLE: &[Row] = &[
         SECTION,
         &[
             SEEN,
-            opt(
-                "eps_in",
-                Type::Num,
-                "0.05",
-                "The probability that an object pixel is observed as \
-                background.",
-            ),
-            opt(
-                "eps_out",
-                Type::Num,
-                "0.05",
-                "The probability that a background pixel is \
-                observed as object.",
-            ),
+            opt("eps_in", Type::Num, "0.05", "The probability that an object pixel is observed as background."),
+            opt("eps_out", Type::Num, "0.05", "The probability that a background pixel is observed as object."),
             SIZE,
         ],
         Type::Likelihood,
@@ -390,12 +351,7 @@ impl Likelihood for ChamferOf {
     }
 
     fn approximations(&self) -> Vec<String> {
-        let cut = self.options.truncate.map(|t| {
-            format!(
-                "distances are truncated at {t}% of the \
-            diagonal"
-            )
-        });
+        let cut = self.options.truncate.map(|t| format!("distances are truncated at {t}% of the diagonal"));
         let most = format!("of more than {} observed points, an evenly spaced subset is used", chamfer::MOST_OBSERVED);
         [Some(drawn(&self.view, self.size)), cut, self.options.symmetric.then_some(most)]
             .into_iter()

@@ -32,13 +32,7 @@ pub(super) const TABLE: &[Row] = &[native(
              of numbers by joint, with `other` for the rest.",
         )
         .unit("percent of the diagonal"),
-        opt(
-            "outlier",
-            Type::Num,
-            "0.05",
-            "The fraction of outliers among detections of full \
-            confidence.",
-        ),
+        opt("outlier", Type::Num, "0.05", "The fraction of outliers among detections of full confidence."),
         opt(
             "offset",
             Type::Num,
@@ -54,13 +48,7 @@ pub(super) const TABLE: &[Row] = &[native(
             "The unit of `sd`, `offset` and `systematic`: \"diagonal\", percent of the picture's \
              diagonal; \"torso\", lengths of the detected torso.",
         ),
-        opt(
-            "confidence",
-            Type::Bool,
-            "true",
-            "Whether detections of low confidence are more \
-            often outliers.",
-        ),
+        opt("confidence", Type::Bool, "true", "Whether detections of low confidence are more often outliers."),
         opt(
             "misses",
             Type::Num,

@@ -22,14 +22,8 @@ pub(super) const TABLE: &[Row] = &[native(
         arg("photo", IMAGE, "The photograph; people cannot be detected in a contour map."),
         opt("views", Type::Int, "2", "The number of views, 2 to 8: with increasing padding, each also mirrored."),
         opt("most", Type::Int, "2", "The maximum number of people per view, 1 to 100."),
-        opt(
-            "near",
-            Type::Array,
-            "[]",
-            "A box [x, y, width, height]: people who fill it best come \
-                                        first.",
-        )
-        .unit("pixels"),
+        opt("near", Type::Array, "[]", "A box [x, y, width, height]: people who fill it best come first.")
+            .unit("pixels"),
     ],
     Type::Array,
     "The people in a photograph, the most prominent first. Each is a record: `keypoints`, 33 \

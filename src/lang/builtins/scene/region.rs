@@ -28,17 +28,10 @@ pub(super) const TABLE: &[Row] = &[native(
             "tiles",
             Type::Int,
             "8",
-            "The number of tiles along each side of the picture, each \
-                                      with its own colour distribution; 0: none.",
+            "The number of tiles along each side of the picture, each with its own colour distribution; 0: none.",
         ),
         opt("tile_power", Type::Num, "0.1", "The power of the term for the tiles."),
-        opt(
-            "colours",
-            Type::Int,
-            "32",
-            "The number of colours the photograph is reduced to, 2 to \
-            256.",
-        ),
+        opt("colours", Type::Int, "32", "The number of colours the photograph is reduced to, 2 to 256."),
         opt(
             "groups",
             Type::Str,

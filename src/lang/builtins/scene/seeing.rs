@@ -22,22 +22,15 @@ pub(super) const TABLE: &[Row] = &[
         SECTION,
         &[
             opt("position", Type::Array, "[0, 0, 8]", "The position of the camera.").unit("scene units"),
-            opt(
-                "look_at",
-                Type::Array,
-                "[0, 0, 0]",
-                "The point it looks at, at the centre of the \
-                picture.",
-            )
-            .unit("scene units"),
+            opt("look_at", Type::Array, "[0, 0, 0]", "The point it looks at, at the centre of the picture.")
+                .unit("scene units"),
             opt("up", Type::Array, "[0, 1, 0]", "The direction that points up in the picture."),
             opt("focal", Type::Num, "1.818", "The focal length as a multiple of the picture's longer side."),
             opt("width", Type::Int, "256", "The width of the picture.").unit("pixels"),
             opt("height", Type::Int, "256", "The height of the picture.").unit("pixels"),
         ],
         CAMERA,
-        "A pinhole camera. By default a view uses the camera of the run: `--camera`, or the \
-         default view.",
+        "A pinhole camera. By default a view uses the camera of the run: `--camera`, or the default view.",
         |a| {
             let eye = vector(a, 0, DVec3::new(0.0, 0.0, 8.0))?;
             let target = vector(a, 1, DVec3::ZERO)?;
@@ -48,10 +41,7 @@ pub(super) const TABLE: &[Row] = &[
             let forward = (target - eye).try_normalize();
             let right = forward.and_then(|f| f.cross(up).try_normalize());
             let (Some(forward), Some(right)) = (forward, right) else {
-                return Err(Fault::domain(
-                    "scene.camera: the viewing direction must not be zero or \
-                    parallel to `up`",
-                ));
+                return Err(Fault::domain("scene.camera: the viewing direction must not be zero or parallel to `up`"));
             };
             let projection = Projection::Pinhole {
                 focal_px: focal * f64::from(width.max(height)),

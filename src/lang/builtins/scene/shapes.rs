@@ -25,8 +25,7 @@ pub(super) const TABLE: &[Row] = &[
                 "thickness",
                 Type::Num,
                 "0",
-                "The thickness of the wall, for a vessel open at the \
-                top; 0 for a solid body.",
+                "The thickness of the wall, for a vessel open at the top; 0 for a solid body.",
             )
             .unit("scene units"),
             opt("caps", Type::Str, "\"both\"", "Which ends are closed: \"both\", \"bottom\", \"top\" or \"none\"."),
@@ -34,8 +33,7 @@ pub(super) const TABLE: &[Row] = &[
                 "floor",
                 Type::Num,
                 "0",
-                "The height of a vessel's floor, or of its contents, above the lower end: at \
-                 least the wall thickness.",
+                "The height of a vessel's floor, or of its contents, above the lower end: at least the wall thickness.",
             )
             .unit("scene units"),
         ],
@@ -77,8 +75,7 @@ pub(super) const TABLE: &[Row] = &[
         SECTION,
         &[arg("solids", Type::Array, "The solids.")],
         SOLID,
-        "Several solids \
-        combined into one.",
+        "Several solids combined into one.",
         |a| {
             let n = a.get(0).len().unwrap_or(0);
             let members = (0..n).map(|i| {
@@ -105,13 +102,7 @@ pub(super) const TABLE: &[Row] = &[
         SECTION,
         &[
             arg("solid", SOLID, "A solid."),
-            opt(
-                "fit",
-                Type::Bool,
-                "false",
-                "Also scales it so that the longest edge of its \
-                bounding box is 2.",
-            ),
+            opt("fit", Type::Bool, "false", "Also scales it so that the longest edge of its bounding box is 2."),
         ],
         SOLID,
         "The solid moved so that the centre of its bounding box is at the origin.",
@@ -129,8 +120,7 @@ pub(super) const TABLE: &[Row] = &[
             arg("points", Type::Record, "Names and positions, as in `{ tip: [0, 2, 0] }`.").unit("scene units"),
         ],
         SOLID,
-        "The solid with named points that move with it, replacing those it had; `solid.landmarks` \
-         returns them.",
+        "The solid with named points that move with it, replacing those it had; `solid.landmarks` returns them.",
         |a| {
             let s = a.object::<SolidValue>(0, "a solid")?;
             let point = |(name, v): (&Arc<str>, &Value)| match v {

@@ -105,11 +105,7 @@ fn ranges_leave_out_their_end() {
 
 #[test]
 fn errors_name_what_stands_at_the_sides() {
-    assert_eq!(
-        fails("+", &[arr(&[1.0; 3]), arr(&[1.0; 4])]),
-        "+: arrays of lengths 3 and 4 do \
-        not match"
-    );
+    assert_eq!(fails("+", &[arr(&[1.0; 3]), arr(&[1.0; 4])]), "+: arrays of lengths 3 and 4 do not match");
     assert_eq!(
         fails("+", &["a".into(), num(1.0)]),
         "`+` needs numbers or strings, got a string and a number (`str(x)` makes a string of a number)"
