@@ -92,9 +92,8 @@ impl Adaptation {
             self.inverse_mass = signature.iter().flat_map(|s| known(s).unwrap_or_else(|| vec![1.0; s.1])).collect();
             self.signature = signature;
             self.forget();
-            if adapting {
-                self.restart(system, here, rng)?;
-            }
+            // The step size is learnt on, over all structures: where these change every few steps it
+            // would otherwise stay at its first guess.
         }
         if let Some(step) = self.fixed {
             return Ok(step);
