@@ -74,6 +74,22 @@ fn a_page_is_made_again() {
     assert!(lit.len() > 60 && lit.iter().all(|d| *d < 3.0), "{lit:?}");
 }
 
+/// Where only joints are compared, as of people, the contours of the photograph are shown all the
+/// same, and count as looked at by nobody.
+#[test]
+fn contours_are_shown_where_only_joints_are_compared() {
+    let f = seen("page-joints");
+    let joints: Vec<&str> = BALL.lines().filter(|l| !l.contains("scene.contour(")).collect();
+    f.write("ball.pcad", joints.join("\n"));
+    f.succeeds(&[&RUN[..], &["2", "--out", "ball"]].concat());
+    let page = made_again(&f, "ball");
+    let pair = page.split("<div class=\"pair\">").nth(1).and_then(|p| p.split("</div>").next()).unwrap_or_default();
+    assert_eq!(pair.matches("<img class=\"lines\"").count(), 2, "the contours of both are side by side");
+    f.write("disc.png", png(image::GrayImage::from_pixel(160, 120, image::Luma([200]))));
+    f.succeeds(&[&RUN[..], &["2", "--out", "blank"]].concat());
+    assert!(!f.read("blank/summary.json").contains("no contours were found"));
+}
+
 /// Where chains came further than others in their time, and names are none that the files of draws
 /// can bear, the page is the same.
 #[test]
