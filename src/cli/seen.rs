@@ -131,7 +131,10 @@ mod tests {
         let at =
             |x: f64, y: f64| out.get_pixel(((x - 85.0) * 768.0 / 130.0) as u32, ((y - 35.0) * 768.0 / 130.0) as u32).0;
         assert_eq!((at(100.0, 100.0), at(200.0, 100.0)), ([255, 220, 0], [90, 220, 255]), "own yellow, detected blue");
-        assert_eq!((at(150.0, 100.0), at(150.0, 90.0)), ([90, 220, 255], [100; 3]), "a line between them");
+        // Lines are thin, and smooth at their sides.
+        let [red, green, blue] = at(150.0, 100.0);
+        assert!(red < 100 && green > 140 && blue > 140, "a line between them: {red} {green} {blue}");
+        assert_eq!(at(150.0, 90.0), [100; 3], "and nothing beside it");
         assert!(joints(&photo, &[]).is_none() && joints(&photo, &[located([f64::NAN; 2], [2.0, 2.0])]).is_none());
     }
 }
