@@ -45,7 +45,7 @@ pub fn show_seen(dir: &RunDir, image: &ImageValue, located: &[Located]) -> Resul
 pub fn warnings(image: Option<(&str, &ImageValue)>, keypoints: Option<&str>, located: &[Located]) -> Vec<String> {
     let mut all = Vec::new();
     if let Some((name, image)) = image
-        && image.seen().is_some_and(|map| map.len() == 0)
+        && image.seen().is_some_and(|map| map.is_empty())
     {
         all.push(format!(
             "no contours were found in `{name}`, so it does not constrain the scene: draws come from \
