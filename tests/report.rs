@@ -74,6 +74,22 @@ fn a_page_is_made_again() {
     assert!(lit.len() > 60 && lit.iter().all(|d| *d < 3.0), "{lit:?}");
 }
 
+/// Where only joints are compared, as of people, the contours of the photograph are shown all the
+/// same, and count as looked at by nobody.
+#[test]
+fn contours_are_shown_where_only_joints_are_compared() {
+    let f = seen("page-joints");
+    let joints: Vec<&str> = BALL.lines().filter(|l| !l.contains("scene.contour(")).collect();
+    f.write("ball.pcad", joints.join("\n"));
+    f.succeeds(&[&RUN[..], &["2", "--out", "ball"]].concat());
+    let page = made_again(&f, "ball");
+    let pair = page.split("<div class=\"pair\">").nth(1).and_then(|p| p.split("</div>").next()).unwrap_or_default();
+    assert_eq!(pair.matches("<img class=\"lines\"").count(), 2, "the contours of both are side by side");
+    f.write("disc.png", png(image::GrayImage::from_pixel(160, 120, image::Luma([200]))));
+    f.succeeds(&[&RUN[..], &["2", "--out", "blank"]].concat());
+    assert!(!f.read("blank/summary.json").contains("no contours were found"));
+}
+
 /// Where chains came further than others in their time, and names are none that the files of draws
 /// can bear, the page is the same.
 #[test]
@@ -82,13 +98,13 @@ fn pages_of_odd_draws_are_made_again() {
     let program = "assume k ~ uniform_discrete(1, 4); assume v ~ iid(normal(0, 1), 3);
         assume w = map(fn(i) { z[i] ~ normal(i, 1); z[i] }, 0 .. k); let both = { a: sum(w), b: v[1] };
         observe normal(sum(w), 2) = 5;
-        infer { warmup 50 { mh(one(@**)); } repeat 400 { mh(one(@**)); collect k, w, v, both; } }";
+        infer { warmup 50 { mh(one(@**)); } repeat 400 { mh(one(@**)); collect k, w, v, both, pow(k, 2); } }";
     f.write("odd.pcad", program);
     f.succeeds(&["run", "odd.pcad", "--chains", "3", "--time", "600ms", "--quiet", "--out", "time"]);
     made_again(&f, "time");
     f.succeeds(&["run", "odd.pcad", "--chains", "3", "--quiet", "--out", "steps"]);
     let page = made_again(&f, "steps");
-    assert!(page.contains("both.<wbr>a"), "the name of before");
+    assert!(page.replace("<wbr>", "").contains(">pow(k, 2)<"), "the name of before, with its comma");
     assert!(!page.contains("<img") && !page.contains("<canvas"), "nothing is seen");
 }
 
@@ -139,7 +155,7 @@ fn what_is_no_whole_run_is_said() {
     f.write("empty/notes.txt", "none");
     for (folder, hint) in [("empty", "`pcadlang run` leaves"), ("nowhere", "no such folder"), ("disc.png", "is a file")]
     {
-        f.refuses(&["report", folder], &format!("{folder} holds no run"));
+        f.refuses(&["report", folder], &format!("{folder} is not the folder of a run"));
         let err = f.run(&["report", folder]).err;
         assert!(err.contains(hint), "{err}");
     }

@@ -83,6 +83,20 @@ fn the_table_fits_narrow_screens() {
     assert!(anywhere.clone().all(|l| l.contains(".settings td") || l.contains("#command")), "letters stay together");
 }
 
+/// Three pictures stand in a row of a window that is 1200 pixels wide, its scroll bar and margins
+/// taken off; heads of tables are one line, and labels of plots that are made smaller stay legible.
+#[test]
+fn the_style_uses_the_width() {
+    let after = |key: &str| STYLE.split(key).nth(1).and_then(|s| s.split("px").next()?.parse::<u32>().ok());
+    let (one, two) = (after("figure { margin: 0; flex: 0 1 ").unwrap(), after("gap: 16px; flex: 0 1 ").unwrap());
+    let page = after("max-width: ").unwrap();
+    assert!(two == 2 * one + 16 && one + 16 + two <= page.min(1200 - 15 - 2 * 15), "{one} {two} {page}");
+    assert!(STYLE.contains(".wide tr:first-child th { white-space: nowrap }"), "R-hat breaks at its hyphen");
+    // Of a plot of 260 pixels that is 180 wide.
+    let label = after("  .plots svg text { font-size: ").unwrap();
+    assert!(label * 180 / 260 >= 9, "{label}");
+}
+
 /// No colour is fixed: all are of the scheme that the reader has.
 #[test]
 fn the_page_has_a_dark_side() {
