@@ -136,12 +136,15 @@ fn programs_that_are_no_joint_distribution_are_refused_with_the_reason() {
         ("assume x ~ normal(0, 1); factor(-x * x) as soft;", "@soft is a factor"),
         ("assume x ~ flat(); observe normal(x, 1) = 0;", "the prior of @x is improper"),
         ("assume x ~ normal(0, 1); freeze @x; observe normal(x, 1) = 0;", "`freeze`"),
-        ("assume x ~ normal(0, 1);", "observes nothing"),
+        ("assume x ~ normal(0, 1);", "has no observations"),
         (
             "assume c ~ flip(0.5); assume x ~ normal(0, 1); if c { observe normal(x, 1) = 0 as y; } observe normal(x, 1) = 1;",
-            "there or not",
+            "whether the observation",
         ),
-        ("assume x ~ normal(0, 1); observe normal(0, 1) = x as y;", "what @y observes depends on choices"),
+        (
+            "assume x ~ normal(0, 1); observe normal(0, 1) = x as y;",
+            "the value observed by @y depends on random choices",
+        ),
     ] {
         let m = model(text);
         let said = match sbc(m.code(), &looped(MH, 1), &settings(20)) {

@@ -143,7 +143,7 @@ mod tests {
         assert_eq!(open.given.sets, [("size".into(), "64".into()), ("keep".into(), "4".into())]);
         assert_eq!((open.sampling.chains(), open.sampling.time), (2, Some(Duration::from_secs(1))));
         assert!(said.starts_with(
-            "--quality fast: --set keep=4 --chains 2 --time 1s, of x.quality.json (error 0.3, 0.2 to 0.4"
+            "--quality fast: --set keep=4 --chains 2 --time 1s, from x.quality.json (error 0.3, 0.2 to 0.4"
         ));
         let mut told = job(None, Some(5.0));
         told.sampling.chains = Some(3);

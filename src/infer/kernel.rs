@@ -112,6 +112,7 @@ pub trait Kernel: Send {
     }
 
     /// The step size of its trajectories, for Hamiltonian kernels.
+    #[doc(hidden)]
     fn step_size(&self) -> Option<f64> {
         None
     }

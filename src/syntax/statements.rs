@@ -40,7 +40,7 @@ pub const STATEMENTS: &[Statement] = &[
         "assume",
         "assume x ~ d #tag;   assume x = e;",
         "A random choice of the model, or a value made of others. Its draws are recorded.",
-        "assume r ~ gamma(2, 1) #size; assume area = pi * r ^ 2;",
+        "assume r ~ gamma(2, 1) #size; assume area = pi * r * r;",
     ),
     model(
         "let",
@@ -112,7 +112,7 @@ pub const STATEMENTS: &[Statement] = &[
         "fn",
         "fn name(x, y = 1) { …; value }",
         "A function: the last expression is its value. `fn(x) { … }` is a value itself.",
-        "fn area(r) { pi * r ^ 2 } let a = area(2);",
+        "fn area(r) { pi * r * r } let a = area(2);",
     ),
     model(
         "for",

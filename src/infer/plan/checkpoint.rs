@@ -74,11 +74,11 @@ impl Checkpoint {
             return None;
         }
         let kernel = |i: &Instance| {
-            let (state, evidence) = match &i.kernel {
-                Some(k) => (k.save(&r.trace), k.log_evidence()),
-                None => (i.saved.clone(), i.stats.log_evidence),
+            let (state, log_evidence, step_size) = match &i.kernel {
+                Some(k) => (k.save(&r.trace), k.log_evidence(), k.step_size()),
+                None => (i.saved.clone(), i.stats.log_evidence, i.stats.step_size),
             };
-            let stats = KernelStats { log_evidence: evidence, ..i.stats.clone() };
+            let stats = KernelStats { log_evidence, step_size, ..i.stats.clone() };
             SavedKernel { signature: i.signature.clone(), state, stats }
         };
         Some(Checkpoint {
