@@ -71,7 +71,7 @@ fn the_first_program_does_what_is_shown() {
     let said = done.out.lines().find_map(|l| l.strip_prefix("slope ")).expect("a table");
     let numbers = |l: &str| l.split_whitespace().take(4).map(str::to_owned).collect::<Vec<_>>();
     assert_eq!(numbers(shown), numbers(said));
-    assert!(done.out.contains("infer {"), "the plan that is used is shown: {}", done.out);
+    assert!(done.err.contains("infer {"), "the plan that is used is shown: {}", done.err);
     // The prompt takes the run up; what is typed there is in docs/repl.md.
     let prompt = f.succeeds(&["repl", "runs/line"]);
     assert!(prompt.out.contains("log joint"), "{}", prompt.out);
