@@ -78,7 +78,7 @@ fn the_first_program_does_what_is_shown() {
     for command in [
         &["sample", "line.pcad", "-n", "3"][..],
         &["check", "line.pcad"],
-        &["fmt", "--check", "line.pcad"],
+        &["fmt", "line.pcad"],
         &["predict", "line.pcad", "--seed", "1", "--out", "checked"],
         &["doc", "observe"],
         &["doc", "--search", "logistic"],
