@@ -529,8 +529,8 @@ pub struct Repl {
 /// What `repl` does with its input.
 const PROMPT: &str = "\
 A terminal has line editing, history and completion (Tab). Piped input runs as a script, which stops with
-exit code 1 at the first error. Ctrl-C clears the line, or cancels the running command and undoes its
-changes; Ctrl-D quits.";
+exit code 1 at the first error. Ctrl-C clears the line, ends inference and keeps its draws, or cancels
+another running command, which then changes nothing; Ctrl-D quits.";
 
 /// Ways to show a picture.
 #[derive(Clone, Copy, Debug, PartialEq, Eq, clap::ValueEnum)]

@@ -9,12 +9,12 @@ use super::page::{PROGRAM, write_page};
 use super::places::{best_of_each, show_places};
 use super::progress::{self, Ending};
 use super::reopened::{TRACES, arguments};
-use super::seen;
-use super::{Failure, date, edges, files, given, people, plain};
+use super::{Failure, date, edges, files, given, people, plain, seen};
 use pcadlang::bank::BankFiles;
 use pcadlang::infer::draws::{KernelStats, MOST_POINTS, Sink, SiteStats};
-use pcadlang::infer::stuck_structure;
-use pcadlang::infer::{BestSoFar, BestState, ChainResult, Evidence, KeptTraces, Progress, Watch, Watches};
+use pcadlang::infer::{
+    BestSoFar, BestState, ChainResult, Evidence, KeptTraces, Progress, Watch, Watches, stuck_structure,
+};
 use pcadlang::lang::{self, builtins::scene::ImageValue};
 use pcadlang::report::{
     ChainDraws, ChainFiles, Memory, Mode, Quantity, RunDir, align, bytes_hash, modes, quantities, table, text_hash,
@@ -355,7 +355,7 @@ fn fill(
     }
     widen(&mut draws);
     let points = chains.first().map_or_else(Vec::new, |c| c.last.points(MOST_POINTS));
-    let step_sizes = chains.iter().map(|c| c.kernels.iter().find_map(|k| k.step_size)).collect();
+    let step_sizes: Vec<_> = chains.iter().map(|c| c.kernels.iter().find_map(|k| k.step_size)).collect();
     let zarr = zarr::write(dir.path(), &draws, &step_sizes, &points);
     zarr.map_err(|e| plain(format!("{}: {e}; earlier output is kept", dir.file(zarr::ZARR).display())))?;
     let quantities = quantities(&draws);
@@ -370,7 +370,7 @@ fn fill(
     let approximate = approximate(job, &chains);
     let sites = SiteStats::total(chains.iter().flat_map(|c| &c.sites));
     warnings.extend(chains.first().and_then(|c| structure_warning(&c.last, &sites)));
-    let given = image.as_ref().and_then(|(name, v)| Some((name.as_str(), v.downcast::<ImageValue>()?)));
+    let given = image.as_ref().map(|(name, _)| name.as_str()).zip(ready.image());
     let located = chains.first().map_or_else(Vec::new, |c| c.last.located());
     warnings.extend(seen::warnings(given, job.keypoints.as_deref(), &located));
     let places = best_of_each(&modes, &best);

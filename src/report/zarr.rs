@@ -14,9 +14,6 @@ use std::path::{Path, PathBuf};
 /// The name of the folder in a run's folder.
 pub const ZARR: &str = "inference.zarr";
 
-/// What is known of each chain beside its draws, in the same order: the step size of its Hamiltonian kernel, if it has one.
-pub type StepSizes = Vec<Option<f64>>;
-
 /// An observed value: its name, and its number; NaN of what is none.
 pub type Point = (String, f64);
 
@@ -35,12 +32,12 @@ struct Array {
     numbers: Numbers,
 }
 
-/// Writes the draws of a run's chains, brought to the same columns before; of chains with draws as many of each as the one with the fewest
+/// Writes the draws of a run's chains, with the step size of each one's Hamiltonian kernel if it has one, brought to the same columns before; of chains with draws as many of each as the one with the fewest
 /// has. An older folder is replaced when the new one is whole.
 ///
 /// # Errors
 /// If it cannot be written.
-pub fn write(dir: &Path, chains: &[ChainDraws], step_sizes: &StepSizes, points: &[Point]) -> io::Result<()> {
+pub fn write(dir: &Path, chains: &[ChainDraws], step_sizes: &[Option<f64>], points: &[Point]) -> io::Result<()> {
     let (place, partial) = (dir.join(ZARR), dir.join(format!(".{ZARR}.partial")));
     remove(&partial)?;
     std::fs::create_dir_all(&partial)?;
@@ -227,7 +224,7 @@ mod tests {
         let chain = |rows| ChainDraws { columns: columns.clone(), rows, ..ChainDraws::default() };
         let chains = [chain(vec![row(1.0), row(2.0), row(3.0)]), chain(vec![]), chain(vec![row(4.0), row(5.0)])];
         for _ in 0..2 {
-            write(&dir, &chains, &vec![Some(0.25), None, Some(0.5)], &[("y[\u{e4}]".into(), 7.0)]).unwrap();
+            write(&dir, &chains, &[Some(0.25), None, Some(0.5)], &[("y[\u{e4}]".into(), 7.0)]).unwrap();
         }
         let read = |name: &str| std::fs::read(dir.join(ZARR).join(name)).unwrap_or_else(|e| panic!("{name}: {e}"));
         let floats =
@@ -246,7 +243,7 @@ mod tests {
         assert_eq!(read("log_likelihood/observation/0")[8..12], 0xe4u32.to_le_bytes());
         assert!(!dir.join(ZARR).join("posterior").join(POINTWISE).exists());
         // Without draws there is nothing in it, and it is no error.
-        write(&dir, &[], &vec![], &[]).unwrap();
+        write(&dir, &[], &[], &[]).unwrap();
         assert!(!dir.join(ZARR).join("log_likelihood").exists());
         std::fs::remove_dir_all(&dir).unwrap();
     }

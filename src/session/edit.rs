@@ -92,9 +92,9 @@ impl Session {
                 Err(_) => return Err(first),
             },
         };
-        if self.trace.log_joint() == f64::NEG_INFINITY && !impossible {
-            // What it was is not possible any more.
-            said = self.redraw(again)?.unwrap_or(said);
+        // What it was may not be possible any more.
+        if self.trace.log_joint() == f64::NEG_INFINITY && !impossible && self.redraw(again)? {
+            said.clear();
         }
         for (_, name) in again {
             let users = users(&new, name);
@@ -118,17 +118,17 @@ impl Session {
         Ok(said)
     }
 
-    /// Draws the choices below some names anew; what is to be said of that, unless it leads nowhere either.
-    fn redraw(&mut self, names: &[Key]) -> Result<Option<String>, Trouble> {
+    /// Draws the choices below some names again, if that gives a state of positive probability; whether it did.
+    fn redraw(&mut self, names: &[Key]) -> Result<bool, Trouble> {
         let below = |a: &Address| names.iter().any(|(_, n)| a.segments.first().is_some_and(|s| s.name == *n));
         let gone: Vec<u64> = self.trace.choices().iter().filter(|(a, ..)| below(a)).map(|(a, ..)| a.hash64()).collect();
         let kept: Vec<_> = self.trace.constraints().into_iter().filter(|(h, _)| !gone.contains(h)).collect();
         let (trace, _) = self.settle(&self.model, &kept, self.trace.replacements())?;
-        if trace.log_joint() == f64::NEG_INFINITY {
-            return Ok(None);
+        let is_possible = trace.log_joint() > f64::NEG_INFINITY;
+        if is_possible {
+            self.trace = trace;
         }
-        self.trace = trace;
-        Ok(Some(String::new()))
+        Ok(is_possible)
     }
 
     /// `forget name`: takes an item out of the program.
@@ -319,22 +319,10 @@ fn closed(text: &str) -> String {
     ways.into_iter().find(|t| parses(t)).unwrap_or_else(|| text.to_owned())
 }
 
-/// The name that an item binds to a value worth showing.
+/// The name that an item binds to a value worth showing: no function, and no single element of a container.
 fn bound(item: &Item) -> Option<Arc<str>> {
-    match &item.kind {
-        ItemKind::Param(d) | ItemKind::Data(d) => Some(Arc::clone(&d.name.node)),
-        ItemKind::Stmt(s) => match &s.kind {
-            StmtKind::Assume { name, .. } | StmtKind::Let { name, .. } | StmtKind::Predict { name, .. } => {
-                Some(Arc::clone(&name.node))
-            }
-            StmtKind::Draw { target, .. } => match &target.kind {
-                ExprKind::Var(name) => Some(Arc::clone(name)),
-                _ => None,
-            },
-            _ => None,
-        },
-        _ => None,
-    }
+    let (space, name) = key(item).filter(|_| !matches!(item.kind, ItemKind::Fn(_)))?;
+    (space == Space::Value && !name.contains('[')).then_some(name)
 }
 
 /// A program's text with more at its end.

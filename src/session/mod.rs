@@ -273,25 +273,34 @@ impl Session {
     /// `:undo`.
     fn undo(&mut self) -> Result<Reply, Trouble> {
         let Some(past) = self.past.pop_back() else { return Err(Trouble::plain("there is nothing to undo")) };
-        let now = self.remember(&past.what);
-        if let Err(e) = self.go_back(&past) {
-            self.past.push_back(past);
-            return Err(e);
+        match self.exchange(&past) {
+            Ok(now) => self.undone.push(now),
+            Err(e) => {
+                self.past.push_back(past);
+                return Err(e);
+            }
         }
-        self.undone.push(now);
         Ok(Reply::text(format!("undone: {}\n{}", past.what, self.summary())))
     }
 
     /// `:redo`.
     fn redo(&mut self) -> Result<Reply, Trouble> {
         let Some(next) = self.undone.pop() else { return Err(Trouble::plain("there is nothing to redo")) };
-        let now = self.remember(&next.what);
-        if let Err(e) = self.go_back(&next) {
-            self.undone.push(next);
-            return Err(e);
+        match self.exchange(&next) {
+            Ok(now) => self.push(now),
+            Err(e) => {
+                self.undone.push(next);
+                return Err(e);
+            }
         }
-        self.push(now);
         Ok(Reply::text(format!("redone: {}\n{}", next.what, self.summary())))
+    }
+
+    /// Goes to a remembered state; gives the present one, by which the same step is taken the other way.
+    fn exchange(&mut self, other: &Past) -> Result<Past, Trouble> {
+        let now = self.remember(&other.what);
+        self.go_back(other)?;
+        Ok(now)
     }
 
     /// Goes on with the program and state of another session; `:undo` goes back.

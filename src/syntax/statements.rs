@@ -5,14 +5,21 @@
 pub struct Statement {
     /// Its keyword.
     pub name: &'static str,
-    /// How it is written.
-    pub form: &'static str,
+    /// How it is written; several ways with three spaces between them.
+    form: &'static str,
     /// One line about it.
     pub doc: &'static str,
     /// A program, or a part of an inference plan.
     pub example: &'static str,
     /// Where it may stand.
     pub place: Place,
+}
+
+impl Statement {
+    /// The ways in which it is written.
+    pub fn forms(&self) -> impl Iterator<Item = &'static str> {
+        self.form.split("   ")
+    }
 }
 
 /// Where a statement may stand.

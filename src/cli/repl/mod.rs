@@ -243,16 +243,12 @@ impl Front {
 
     /// Has the program edited; a text with errors is kept for the next time.
     fn edit(&mut self) -> Result<Reply, Failure> {
-        let text = self.draft.take().unwrap_or_else(|| self.session.borrow().text().to_owned());
+        let text = self.draft.clone().unwrap_or_else(|| self.session.borrow().text().to_owned());
         let edited = edit::edited(&text)?;
         let replaced = self.session.borrow_mut().replace(&edited);
-        if replaced.is_err() {
-            self.draft = Some(edited);
-        }
-        replaced.map_err(|t| match t {
-            Trouble::Program(e) => Failure::Program(e),
-            t => Failure::from(t.hint("`:edit` goes on with the text as you left it")),
-        })
+        self.draft = replaced.is_err().then_some(edited);
+        // A text with errors has its messages; anything else gets the hint.
+        Ok(replaced.map_err(|t| t.hint("`:edit` goes on with the text as you left it"))?)
     }
 }
 

@@ -22,7 +22,7 @@ pub fn doc(table: &Table, name: &str) -> Option<String> {
 
 /// What `doc` says of a statement.
 fn statement(s: &Statement) -> String {
-    let forms: Vec<&str> = s.form.split("   ").collect();
+    let forms: Vec<&str> = s.forms().collect();
     let place = match s.place {
         Place::Model => "",
         Place::Plan => "It stands in an `infer` block or a kernel.\n\n",
@@ -67,7 +67,7 @@ pub fn reference(table: &Table) -> String {
     let mut s = String::new();
     let _ = write!(s, "## Statements\n\n");
     for x in STATEMENTS {
-        let forms: Vec<String> = x.form.split("   ").map(|f| format!("`{f}`")).collect();
+        let forms: Vec<String> = x.forms().map(|f| format!("`{f}`")).collect();
         let _ = writeln!(s, "- **{}**. {}", forms.join(", "), x.doc);
     }
     let _ = write!(s, "\n## Constants\n\n");
