@@ -223,7 +223,6 @@ fn what_was_not_warmed_up_is_found_once() {
 fn a_metric_depends_on_nothing_but_the_choices_there_are() {
     let kernels = ["hmc($continuous, steps = 3); mh(@c);", "nuts($continuous, max_depth = 4); mh(@c);"];
     // Of several seeds, since a branch may change just where a window ends, which leaves one state to tell a variance from.
-    let mut learning = 0;
     for (kernel, seed) in kernels.iter().flat_map(|k| (0..6).map(move |seed| (*k, seed))) {
         let all = states(&model(BRANCHES, kernel), seed, 400, 150);
         let of = |step: u64| {
@@ -232,8 +231,7 @@ fn a_metric_depends_on_nothing_but_the_choices_there_are() {
             field(&adaptation, "learnt").as_map().unwrap().len()
         };
         // Nothing of it is lost again, by the choices that it is of.
-        assert!((1..550).all(|step| of(step) <= of(step + 1)), "{kernel}: a metric is forgotten");
-        learning += usize::from(of(400) > 1);
+        assert!((1..550).all(|step| of(step) <= of(step + 1)) && of(400) > 1, "{kernel}: a metric is forgotten");
         let mut seen: Vec<(Value, Vec<Value>)> = Vec::new();
         for (_, states) in all.iter().filter(|(step, _)| *step >= 400) {
             let adaptation = read(&states[0]).as_array().unwrap()[0].clone();
@@ -248,7 +246,6 @@ fn a_metric_depends_on_nothing_but_the_choices_there_are() {
         }
         assert_eq!(seen.len(), 2, "{kernel}: both branches are visited");
     }
-    assert!(learning >= 6, "{learning} of 12 learn a metric");
 }
 
 #[test]

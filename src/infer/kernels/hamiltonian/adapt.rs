@@ -45,9 +45,37 @@ pub(super) struct Adaptation {
     seen: u32,
     window_end: u32,
     window: u32,
+    /// The states of this window, by address: choices that go and come back are counted on.
+    states: BTreeMap<u64, Moments>,
+}
+
+/// Means and sums of squares of a choice's coordinates (Welford 1962).
+#[derive(Clone, Debug, Default, Serialize, Deserialize)]
+struct Moments {
+    count: f64,
     mean: Vec<f64>,
     square: Vec<f64>,
-    count: f64,
+}
+
+impl Moments {
+    fn add(&mut self, y: &[f64]) {
+        if self.mean.len() != y.len() {
+            *self = Moments { count: 0.0, mean: vec![0.0; y.len()], square: vec![0.0; y.len()] };
+        }
+        self.count += 1.0;
+        for ((m, s), y) in self.mean.iter_mut().zip(&mut self.square).zip(y) {
+            let d = y - *m;
+            *m += d / self.count;
+            *s += d * (y - *m);
+        }
+    }
+
+    /// The variances, drawn towards a small one, as Stan does, for few states; one state has none.
+    fn variances(&self) -> Option<Vec<f64>> {
+        let n = self.count;
+        let variance = |s: &f64| (n / (n + 5.0)) * (s / (n - 1.0)) + 1e-3 * 5.0 / (n + 5.0);
+        (n >= 2.0).then(|| self.square.iter().map(variance).collect())
+    }
 }
 
 impl Adaptation {
@@ -66,9 +94,7 @@ impl Adaptation {
             seen: 0,
             window_end: BURN + WINDOW,
             window: WINDOW,
-            mean: Vec::new(),
-            square: Vec::new(),
-            count: 0.0,
+            states: BTreeMap::new(),
         }
     }
 
@@ -79,7 +105,8 @@ impl Adaptation {
     pub fn take_up(&mut self, read: Adaptation) -> Result<(), StateError> {
         let n = read.inverse_mass.len();
         let sizes = read.signature.iter().try_fold(0usize, |sum, s| sum.checked_add(s.1));
-        holds(sizes == Some(n) && read.mean.len() == n && read.square.len() == n, "a step size and metric")?;
+        let whole = |m: &Moments| m.mean.len() == m.square.len();
+        holds(sizes == Some(n) && read.states.values().all(whole), "a step size and metric")?;
         *self = Adaptation { target: self.target, fixed: self.fixed, ..read };
         Ok(())
     }
@@ -87,13 +114,10 @@ impl Adaptation {
     /// The step size to use now, found by trial when there is none yet.
     pub fn step(&mut self, system: &mut System, here: &Point, adapting: bool, rng: &mut Stream) -> TraceResult<f64> {
         if system.signature() != self.signature {
-            let signature = system.signature().to_vec();
-            let known = |(hash, n): &(u64, usize)| self.learnt.get(hash).filter(|m| m.len() == *n).cloned();
-            self.inverse_mass = signature.iter().flat_map(|s| known(s).unwrap_or_else(|| vec![1.0; s.1])).collect();
-            self.signature = signature;
-            self.forget();
-            // The step size is learnt on, over all structures: where these change every few steps it
-            // would otherwise stay at its first guess.
+            // Step size and windows go on over all structures: where these change every few steps they would otherwise learn
+            // nothing.
+            self.signature = system.signature().to_vec();
+            self.inverse_mass = self.metric();
         }
         if let Some(step) = self.fixed {
             return Ok(step);
@@ -123,16 +147,15 @@ impl Adaptation {
         self.averaged = if self.rounds == 1.0 { self.step } else { libm::exp(log_averaged.clamp(SHORTEST, LONGEST)) };
         self.seen = self.seen.saturating_add(1);
         if self.seen > BURN {
-            self.count += 1.0;
-            for ((m, s), y) in self.mean.iter_mut().zip(&mut self.square).zip(y) {
-                let d = y - *m;
-                *m += d / self.count;
-                *s += d * (y - *m);
+            let mut rest = y;
+            for (hash, n) in &self.signature {
+                let (own, others) = rest.split_at((*n).min(rest.len()));
+                self.states.entry(*hash).or_default().add(own);
+                rest = others;
             }
         }
         if self.seen == self.window_end {
             self.close();
-            self.forget();
             self.window = self.window.saturating_mul(2);
             self.window_end = self.seen.saturating_add(self.window);
             // The step is learnt anew for the new metric, from about where it was.
@@ -142,27 +165,17 @@ impl Adaptation {
         }
     }
 
-    /// Ends a window with the variances of its states, drawn towards a small one, as Stan does, for few of them.
+    /// Ends a window: its variances are the metric of the choices that it saw twice.
     fn close(&mut self) {
-        let n = self.count;
-        // The window began anew with the choices there are: one state has no variance.
-        if n < 2.0 {
-            return;
-        }
-        for (m, s) in self.inverse_mass.iter_mut().zip(&self.square) {
-            *m = (n / (n + 5.0)) * (s / (n - 1.0)) + 1e-3 * 5.0 / (n + 5.0);
-        }
-        let mut rest = &self.inverse_mass[..];
-        for (hash, n) in &self.signature {
-            let (own, others) = rest.split_at((*n).min(rest.len()));
-            self.learnt.insert(*hash, own.to_vec());
-            rest = others;
-        }
+        let seen = std::mem::take(&mut self.states);
+        self.learnt.extend(seen.into_iter().filter_map(|(hash, m)| Some((hash, m.variances()?))));
+        self.inverse_mass = self.metric();
     }
 
-    fn forget(&mut self) {
-        let n = self.inverse_mass.len();
-        (self.mean, self.square, self.count) = (vec![0.0; n], vec![0.0; n], 0.0);
+    /// The inverse masses of the choices there are: what windows ended with, or 1.
+    fn metric(&self) -> Vec<f64> {
+        let known = |(hash, n): &(u64, usize)| self.learnt.get(hash).filter(|m| m.len() == *n).cloned();
+        self.signature.iter().flat_map(|s| known(s).unwrap_or_else(|| vec![1.0; s.1])).collect()
     }
 
     /// Doubles or halves the step until one leapfrog step is accepted half of the time (algorithm 4).
